@@ -15,7 +15,7 @@ use crate::error::ClientError;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{ClientId, Tried};
 use crate::poses::{Newest, Poses, SentPose};
-use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
+use crate::view_request::{EncodedFrame, Frame, LiveFrame, ViewRequest};
 use crate::window::check_frame;
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
@@ -109,7 +109,8 @@ impl LiveStream {
     /// Waits until there is another plan, or the same may be tried again.
     async fn wait_for_others(&mut self, tried: Tried) -> Result<Tried, ClientError> {
         let is_over = self.failing_since.get_or_insert_with(Instant::now).elapsed() > GIVE_UP_AFTER;
-        if tried.is_exhausted() || is_over {
+        let has_no_room = tried.last.is_some() && !tried.has_failed_with_room;
+        if has_no_room || is_over {
             return Err(tried.last.unwrap_or_else(|| ClientError::ended("the plan has no compositor")));
         }
         match timeout(RETRY, self.state.changed()).await {
@@ -249,6 +250,5 @@ pub(crate) async fn decode_all(
 async fn decode_live(encoded: EncodedFrame, peer: &Peer) -> Result<LiveFrame, ClientError> {
     let EncodedFrame { request, header, data, posed, sent, received, .. } = encoded;
     let (header, view) = decode(WholeFrame { frame: request.frame, header, data }, peer).await?;
-    let times = LiveTimes { posed, sent, received, decoded: Instant::now() };
-    Ok(LiveFrame { frame: Frame { request, view, header }, times })
+    Ok(LiveFrame { frame: Frame { request, view, header }, posed, sent, received, decoded: Instant::now() })
 }

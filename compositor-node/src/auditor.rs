@@ -112,10 +112,10 @@ impl Auditor {
     ) -> Result<(ViewErrors, f64), Status> {
         let Chosen { plan, set, view: Candidate { camera, .. }, scene_time_s } = chosen;
         let scene = &plan.workload.scene;
-        if !self.node.scenes.engine().has_scene(scene.hash.as_str()) {
+        if !self.node.engine.has_scene(scene.hash.as_str()) {
             // Loading may take minutes: the set is not kept for it.
             drop(set);
-            self.node.scenes.ensure(scene).await?;
+            self.node.ensure_scene(scene).await?;
             return Err(Status::unavailable("the scene was not loaded"));
         }
         // As a certificate's views are: without the exposure and the curve of a client.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SceneRef, SetContent};
+use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SetContent};
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
@@ -15,8 +15,6 @@ use crate::view_times::ViewKind;
 
 /// Views of one call to the device.
 pub(crate) const MAX_BATCH: usize = 64;
-/// Pixels of one call, times their samples: 64 views of full HD would hold half a gigabyte.
-const MAX_BATCH_PIXELS: usize = 64 << 20;
 
 /// The kind of views that are drawn with few rays until their set is there.
 const PREVIEW: &str = "preview";
@@ -46,12 +44,6 @@ impl BatchKey {
         let antialias = self.planes.antialias;
         ViewKind { workload_number: self.workload_number, method: method.to_owned(), antialias }
     }
-
-    /// The most views of one call to the device.
-    pub(crate) fn max_views(&self) -> usize {
-        let samples = self.size_px.element_product() as usize * self.planes.antialias.samples() as usize;
-        (MAX_BATCH_PIXELS / samples.max(1)).clamp(1, MAX_BATCH)
-    }
 }
 
 /// The source of views.
@@ -61,16 +53,6 @@ pub(crate) enum Source {
     Sets(ViewSets),
     /// The scene itself.
     Scene { plan: Arc<Assignment>, scene_time_s: f32 },
-}
-
-impl Source {
-    /// The scene that surfaces, or all of the views, are drawn from.
-    pub(crate) fn scene(&self) -> &SceneRef {
-        match self {
-            Self::Sets(sets) => &sets.of_cell.scene,
-            Self::Scene { plan, .. } => &plan.workload.scene,
-        }
-    }
 }
 
 /// The name of a view's source.

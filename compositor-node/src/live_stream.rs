@@ -119,7 +119,7 @@ impl<'a> LiveStream<'a> {
             course: Course::default(),
             aside: None,
             _viewer: client.shared.arrivals.viewers.clone(),
-            _on_device: client.shared.node.scenes.engine().live_stream(),
+            _on_device: client.shared.node.engine.live_stream(),
         }
     }
 

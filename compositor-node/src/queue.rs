@@ -14,6 +14,8 @@ use crate::batch::{BatchKey, MAX_BATCH, Waiting};
 const SHARED_VIEWS: usize = 8;
 /// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
+/// Pixels of one call, times their samples: 64 views of full HD would hold half a gigabyte.
+const MAX_BATCH_PIXELS: usize = 64 << 20;
 
 /// The ways to the device. Each has one call to it at a time, so that no view of a live stream waits for a call of a batch,
 /// and none for a long view of another stream.
@@ -119,7 +121,9 @@ impl FairQueue {
             return Vec::new();
         };
         // While live streams are open, a pose may arrive at any time.
-        let most = most.min(if has_viewers { shared(&wanted) } else { wanted.max_views() });
+        let samples = wanted.size_px.element_product() as usize * wanted.planes.antialias.samples() as usize;
+        let most_of_call = (MAX_BATCH_PIXELS / samples.max(1)).clamp(1, MAX_BATCH);
+        let most = most.min(if has_viewers { shared(&wanted) } else { most_of_call });
         // The most views of each stream.
         let rounds = if order.len() == 1 { MAX_BATCH } else { shared(&wanted) };
         let first = self.take_round(&order, &wanted, most);

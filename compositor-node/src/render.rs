@@ -105,12 +105,12 @@ impl Rendering {
         let key = batch[0].key.clone();
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
-        let scene = source.scene().clone();
-        let operation = match &source {
-            Source::Sets(_) => Operation::ReconstructView,
-            Source::Scene { .. } => Operation::DirectView,
+        // The scene that surfaces, or all of the views, are drawn from.
+        let (scene, operation) = match &source {
+            Source::Sets(sets) => (sets.of_cell.scene.clone(), Operation::ReconstructView),
+            Source::Scene { plan, .. } => (plan.workload.scene.clone(), Operation::DirectView),
         };
-        let making = self.auditor.node.scenes.on_device(&scene, move |engine| {
+        let making = self.auditor.node.on_device(&scene, move |engine| {
             let (views, busy_s) = own_time(engine, || views_of(engine, &source, &key, &cameras, turn));
             Ok((views?, busy_s))
         });

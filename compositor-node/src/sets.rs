@@ -74,12 +74,6 @@ fn moment(plan: &Assignment, set_index: u32) -> Option<SetContent> {
     SetContent::of(&workload, set_index)
 }
 
-/// The content of a cell's sets without their time: equal for all moments.
-fn subject(plan: &Assignment) -> Option<SetContent> {
-    let workload = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
-    SetContent::of(&workload, 0)
-}
-
 /// The sets of one compositor: the latest few moments of each cell, as long as memory has room.
 pub(crate) struct Sets {
     node: Arc<NodeParts>,
@@ -94,7 +88,7 @@ pub(crate) struct Sets {
 impl Sets {
     /// Checks that a plan's samples have the planes that a method needs, where there are samples.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
-        let needed = self.node.scenes.engine().sample_planes(method)?;
+        let needed = self.node.engine.sample_planes(method)?;
         let is_drawn = plan.policy == Policy::Direct || method == DIRECT;
         if is_drawn || plan.workload.planes.contain(needed) {
             return Ok(());
@@ -216,7 +210,7 @@ impl Sets {
         }
         let on_device = match sets.is_empty() {
             true => of_cell.set.clone(),
-            false => self.node.scenes.engine().with_common(of_cell.set.clone(), sets)?,
+            false => self.node.engine.with_common(of_cell.set.clone(), sets)?,
         };
         Ok(Some(ViewSets { of_cell, on_device, _common: in_use }))
     }
@@ -331,7 +325,8 @@ impl Sets {
             self.reports.report(plan.plan_epoch, &failed);
             failed.status
         })?;
-        let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
+        let still = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
+        let subject = SetContent::of(&still, 0).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
         let compared = if compares_images(plan) { set.images.depth() } else { &[] };
@@ -340,7 +335,7 @@ impl Sets {
             set_bytes(&set.images) + depth_images_bytes(compared) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
-        let uploading = self.node.scenes.on_device(&plan.workload.scene, move |engine| {
+        let uploading = self.node.on_device(&plan.workload.scene, move |engine| {
             let (set, upload_s) = own_time(engine, || engine.upload(&set, Turn::of(WorkClass::Batch)));
             Ok((set?, upload_s))
         });

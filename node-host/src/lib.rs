@@ -95,15 +95,14 @@ async fn serve_on(
     shutdown: CancellationToken,
 ) -> Result<Option<String>, ServeError> {
     let node = NodeParts::new(engine, config, metrics, shutdown.clone());
-    let engine = node.scenes.engine();
     let address = listener.local_addr()?;
     let status = NodeStatus {
         node_name: config.node_name.clone(),
         address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
-        device_name: engine.device_name(),
-        is_software: engine.is_software(),
+        device_name: node.engine.device_name(),
+        is_software: node.engine.is_software(),
     };
-    let probers = Arc::new(Probers::new(engine));
+    let probers = Arc::new(Probers::new(node.engine.clone()));
     let compositor = CompositorService::new(node.clone(), probers.clone());
     let sampler = SamplerService::new(node.clone(), compositor.relay());
     let service = NodeService::new(node.clone(), probers);

@@ -84,7 +84,7 @@ impl SamplerService {
             if !node.plans.have_set(&content, set_index) {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
-            let sampled = node.scenes.on_device(&scene, move |engine| sample(engine, &work)).await?;
+            let sampled = node.on_device(&scene, move |engine| sample(engine, &work)).await?;
             let images = blocking(move || pack(&sampled, tiles, number, &node.metrics)).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))

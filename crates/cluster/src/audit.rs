@@ -111,12 +111,6 @@ pub(crate) fn check_view_errors(errors: &ViewErrors) -> Result<(), InvalidField>
 }
 
 impl AuditReport {
-    /// Whether there is nothing to report.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.views.is_empty() && self.covered_views == 0 && self.uncovered_views == 0
-    }
-
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {

@@ -245,7 +245,12 @@ impl Workload {
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.scene.validate()?;
         self.check_cells()?;
-        self.check_common()?;
+        CommonCell::check_all(&self.common_cells)?;
+        let common = self.common_cells.len();
+        if common > 0 && common >= self.cell_first_indices.len() {
+            let allowed = "fewer than cells: views have one at least";
+            return Err(InvalidField::out_of_range("common_cells", common, allowed));
+        }
         self.check_models()?;
         for camera in &self.sample_cameras {
             camera.validate().map_err(|source| InvalidField::Camera { field: "sample_cameras", source })?;
@@ -309,16 +314,6 @@ impl Workload {
             true => Err(InvalidField::out_of_range("timeline", "of a scene that moves", "still for a layered cube")),
             false => Ok(()),
         }
-    }
-
-    fn check_common(&self) -> Result<(), InvalidField> {
-        CommonCell::check_all(&self.common_cells)?;
-        let common = self.common_cells.len();
-        if common > 0 && common >= self.cell_first_indices.len() {
-            let allowed = "fewer than cells: views have one at least";
-            return Err(InvalidField::out_of_range("common_cells", common, allowed));
-        }
-        Ok(())
     }
 }
 

@@ -22,12 +22,6 @@ struct Held<V> {
     freed: Arc<Notify>,
 }
 
-impl<V> Held<V> {
-    fn is_unused(&self) -> bool {
-        self.pins.load(Ordering::Acquire) == 0
-    }
-}
-
 impl<V> Pinned<V> {
     fn new(held: &Arc<Held<V>>) -> Self {
         held.pins.fetch_add(1, Ordering::AcqRel);
@@ -139,7 +133,7 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
         let mut beyond = state.by_use();
         beyond.retain(|(_, held, _)| alike(&held.value));
         beyond.truncate(beyond.len().saturating_sub(most));
-        beyond.retain(|(_, held, _)| held.is_unused());
+        beyond.retain(|(_, held, _)| held.pins.load(Ordering::Acquire) == 0);
         let evicted = state.evict_until(0, beyond);
         drop(state);
         drop(evicted);
@@ -331,7 +325,7 @@ impl<K: Clone + Eq + Hash, V> State<K, V> {
     /// The values that are not in use and were not used within `recently`.
     fn unused(&self, recently: Duration) -> Vec<UsedValue<K, V>> {
         let mut unused = self.by_use();
-        unused.retain(|(_, held, used_at)| held.is_unused() && used_at.elapsed() >= recently);
+        unused.retain(|(_, held, used_at)| held.pins.load(Ordering::Acquire) == 0 && used_at.elapsed() >= recently);
         unused
     }
 

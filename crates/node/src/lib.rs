@@ -40,7 +40,6 @@ pub use membership::keep_membership;
 pub use parts::NodeParts;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use port::Port;
-pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve};
 pub use service::NodeService;
 pub use set_bytes::{depth_images_bytes, most_image_bytes, most_set_bytes, set_bytes};

@@ -92,7 +92,7 @@ async fn report(client: &CoordinatorClient, parts: &NodeParts) {
 fn preload(welcome: Welcome, parts: Arc<NodeParts>) {
     tokio::spawn(async move {
         for scene in welcome.scenes {
-            if let Err(status) = parts.scenes.ensure(&scene).await {
+            if let Err(status) = parts.ensure_scene(&scene).await {
                 tracing::warn!(scene = %scene.hash, reason = status.message(), "not loaded ahead");
             }
         }
@@ -108,8 +108,8 @@ async fn warm_up(client: &CoordinatorClient, parts: &NodeParts) {
     let start = Instant::now();
     let warming = async {
         for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
-            parts.scenes.ensure(&served.assignment.workload.scene).await?;
-            let engine = parts.scenes.engine();
+            parts.ensure_scene(&served.assignment.workload.scene).await?;
+            let engine = parts.engine.clone();
             blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
         }
         Ok::<_, Status>(())
@@ -140,15 +140,14 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)
 }
 
-/// The smallest light field.
-const WARM_DIRECTIONS: LightDirections = LightDirections::D66;
-const WARM_SIDE_PX: u32 = *LIGHT_FIELD_SIDES.start();
-
 fn small(workload: &Workload) -> Workload {
     let mut cube = CubeGrid::around(&workload.volume, SIZE_PX.x).into_iter().flat_map(|grid| grid.cameras());
     let sample_cameras = workload.sample_cameras.iter().map(|camera| match camera {
         SampleCamera::Layered(_) => cube.next().map_or(*camera, SampleCamera::from),
-        SampleCamera::LightField(field) => LightFieldCamera::around(field.bounds, WARM_DIRECTIONS, WARM_SIDE_PX).into(),
+        // The smallest one.
+        SampleCamera::LightField(field) => {
+            LightFieldCamera::around(field.bounds, LightDirections::D66, *LIGHT_FIELD_SIDES.start()).into()
+        }
         SampleCamera::Depth(_) => camera.resized(SIZE_PX),
     });
     Workload { sample_cameras: sample_cameras.collect(), ..workload.clone() }

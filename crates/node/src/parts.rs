@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use tokio::sync::Mutex;
 use tokio_util::sync::CancellationToken;
 
 use crate::config::NodeConfig;
 use crate::device_monitor::DeviceMonitor;
 use crate::engine::Engine;
 use crate::plan::PlansInForce;
-use crate::scenes::Scenes;
 use crate::telemetry::NodeMetrics;
 
 /// The parts of one node that its services share.
@@ -19,12 +19,14 @@ pub struct NodeParts {
     pub plans: PlansInForce,
     /// Its device.
     pub monitor: DeviceMonitor,
-    /// Its scenes on the device.
-    pub scenes: Scenes,
+    /// The monitored device.
+    pub engine: Arc<dyn Engine>,
     /// Its metrics.
     pub metrics: NodeMetrics,
     /// Ends its streams and its membership.
     pub shutdown: CancellationToken,
+    /// One load at a time: two plans may want the same scene.
+    pub(crate) loading: Mutex<()>,
 }
 
 impl NodeParts {
@@ -37,8 +39,14 @@ impl NodeParts {
         shutdown: CancellationToken,
     ) -> Arc<Self> {
         let monitor = DeviceMonitor::new(engine);
-        let scenes = Scenes::new(Arc::new(monitor.clone()), config);
-        let plans = PlansInForce::new(&config.node_name);
-        Arc::new(Self { config: config.clone(), plans, monitor, scenes, metrics, shutdown })
+        Arc::new(Self {
+            config: config.clone(),
+            plans: PlansInForce::new(&config.node_name),
+            engine: Arc::new(monitor.clone()),
+            monitor,
+            metrics,
+            shutdown,
+            loading: Mutex::default(),
+        })
     }
 }

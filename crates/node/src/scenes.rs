@@ -1,39 +1,24 @@
 //! Scenes by hash: from the mounted folder, or else from the coordinator.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 use std::{fs, io};
 
 use cluster::{FetchScene, SceneHash, ScenePart, SceneRef};
-use tokio::sync::Mutex;
 use tonic::Status;
 use wire::rpc::{CoordinatorClient, connect};
 
 use crate::blocking::blocking;
-use crate::config::NodeConfig;
 use crate::engine::{Engine, EngineError};
+use crate::parts::NodeParts;
 use crate::streams::next_within;
 
-/// Loads scenes onto the device.
-pub struct Scenes {
-    engine: Arc<dyn Engine>,
-    config: NodeConfig,
-    /// One load at a time: two plans may want the same scene.
-    loading: Mutex<()>,
-}
-
-impl Scenes {
-    /// The scenes of one node.
-    pub(crate) fn new(engine: Arc<dyn Engine>, config: &NodeConfig) -> Self {
-        Self { engine, config: config.clone(), loading: Mutex::new(()) }
-    }
-
+impl NodeParts {
     /// Makes sure that the device has a scene; gives the seconds that this took, 0 where it was loaded already.
     ///
     /// # Errors
     /// Where it cannot be found, does not have its hash, or cannot be loaded.
-    pub async fn ensure(&self, scene: &SceneRef) -> Result<f64, Status> {
+    pub async fn ensure_scene(&self, scene: &SceneRef) -> Result<f64, Status> {
         // A plan whose scene is there does not wait for the scene of another.
         if self.engine.has_scene(scene.hash.as_str()) {
             return Ok(0.0);
@@ -48,7 +33,7 @@ impl Scenes {
         let stored = blocking(move || folder.map_or(Ok(None), |folder| read_verified(&folder, &hash)));
         let package = match stored.await? {
             Some(package) => package,
-            None => self.fetch(scene).await?,
+            None => self.fetch_scene(scene).await?,
         };
         let engine = self.engine.clone();
         let hash = scene.hash.clone();
@@ -58,37 +43,31 @@ impl Scenes {
         Ok(seconds)
     }
 
-    /// The device.
-    #[must_use]
-    pub fn engine(&self) -> Arc<dyn Engine> {
-        self.engine.clone()
-    }
-
     /// Does work on the device, on a blocking thread. Where a scene that it needs has left the device since the plan was
     /// applied, the scene is loaded and the work done again.
     ///
     /// # Errors
-    /// The work's own, and those of [`Scenes::ensure`].
+    /// The work's own, and those of [`NodeParts::ensure_scene`].
     pub async fn on_device<T: Send + 'static>(
         &self,
         scene: &SceneRef,
         work: impl Fn(&dyn Engine) -> Result<T, EngineError> + Clone + Send + 'static,
     ) -> Result<T, Status> {
         let attempt = || {
-            let engine = self.engine();
+            let engine = self.engine.clone();
             let work = work.clone();
             blocking(move || Ok::<_, Status>(work(engine.as_ref())))
         };
         match attempt().await? {
             Err(EngineError::UnknownScene { .. }) => {
-                self.ensure(scene).await?;
+                self.ensure_scene(scene).await?;
                 Ok(attempt().await??)
             }
             done => Ok(done?),
         }
     }
 
-    async fn fetch(&self, scene: &SceneRef) -> Result<Vec<u8>, Status> {
+    async fn fetch_scene(&self, scene: &SceneRef) -> Result<Vec<u8>, Status> {
         // A channel of its own: bulk must not hold up membership.
         let client = CoordinatorClient::new(connect(&self.config.coordinator).await?);
         let mut parts = client.fetch_scene(FetchScene { hash: scene.hash.clone(), offset_bytes: 0 }).await?;

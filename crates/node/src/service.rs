@@ -35,8 +35,8 @@ impl NodeService {
     }
 
     async fn measure_now(&self, request: &MeasureCosts) -> Result<Measured, Status> {
-        self.node.scenes.ensure(&request.workload.scene).await?;
-        let engine = self.node.scenes.engine();
+        self.node.ensure_scene(&request.workload.scene).await?;
+        let engine = self.node.engine.clone();
         let request = request.clone();
         blocking(move || measure_costs(engine.as_ref(), &request)).await
     }
@@ -46,7 +46,7 @@ impl NodeService {
         self.node.config.quotas.check_views(&request.typical_views, planes)?;
         // A call that is cancelled is measured to its end, before the next.
         let probes = self.probes.clone().lock_owned().await;
-        self.node.scenes.ensure(&request.workload.scene).await?;
+        self.node.ensure_scene(&request.workload.scene).await?;
         blocking(move || probes.probe(&request, &budget)).await
     }
 }
@@ -70,7 +70,7 @@ impl rpc::Node for NodeService {
         let scene = &request.workload.scene;
         let measured = match self.measure_now(&request).await {
             // The scenes of others may have driven it out meanwhile.
-            Err(_) if !self.node.scenes.engine().has_scene(scene.hash.as_str()) => self.measure_now(&request).await?,
+            Err(_) if !self.node.engine.has_scene(scene.hash.as_str()) => self.measure_now(&request).await?,
             done => done?,
         };
         let request = MeasureCosts { in_background: false, ..request };
@@ -85,7 +85,7 @@ impl rpc::Node for NodeService {
         let plan_epoch = *plan_epoch;
         let workload_number = *workload_number;
         self.node.plans.admits(&plan.assignment)?;
-        let scene_load_s = self.node.scenes.ensure(&workload.scene).await?;
+        let scene_load_s = self.node.ensure_scene(&workload.scene).await?;
         let ended = self.node.plans.apply(plan)?;
         if !ended.is_empty() {
             tracing::info!(node = &*self.node.plans.node_name, ?ended, "workloads have ended");
