@@ -48,7 +48,7 @@ pub(crate) struct Arrivals {
     /// meanwhile.
     pub(crate) viewers: Arc<()>,
     /// Batches of the lanes that follow the plan.
-    served: AtomicU64,
+    pub(crate) served: AtomicU64,
 }
 
 #[derive(Default)]
@@ -67,11 +67,6 @@ impl Arrivals {
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
         self.lanes.iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
-    }
-
-    /// A count that rises with every batch of the lanes that follow the plan.
-    pub(crate) fn served(&self) -> u64 {
-        self.served.load(Ordering::Relaxed)
     }
 
     /// Waits for the next batch of a lane.

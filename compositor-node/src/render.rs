@@ -1,6 +1,7 @@
 //! The device's loops, one for each lane: batch by batch, while the frames of the batch before are encoded and sent.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
@@ -57,9 +58,9 @@ impl Rendering {
                 is_wanted
             });
             if !batch.is_empty() {
-                let served = arrivals.served();
+                let served = arrivals.served.load(Ordering::Relaxed);
                 let busy_s = self.render(turn, batch, place).await;
-                if lane == Lane::Direct && arrivals.served() > served {
+                if lane == Lane::Direct && arrivals.served.load(Ordering::Relaxed) > served {
                     tokio::time::sleep(pause(busy_s, self.auditor.node.config.direct_share)).await;
                 } else if lane == Lane::Preview {
                     tokio::time::sleep(pause(busy_s, PREVIEW_SHARE)).await;

@@ -16,6 +16,9 @@ use crate::engine::{
 /// Calls that run out of memory one after the other, until the node leaves.
 const MAX_SHORTAGES: usize = 3;
 
+/// Frees the sets of a cache that are not in use; gives their bytes.
+type FreeMemory = Arc<dyn Fn() -> usize + Send + Sync>;
+
 /// An engine with help for the faults of the device inside. Clones share it.
 #[derive(Clone)]
 pub struct DeviceMonitor {
@@ -23,8 +26,7 @@ pub struct DeviceMonitor {
     lost: watch::Sender<Option<String>>,
     /// Calls that have run out of memory since the last that did not.
     shortages: watch::Sender<usize>,
-    /// Each frees the sets of a cache that are not in use, and gives their bytes.
-    memory: Arc<Mutex<Vec<Arc<dyn Fn() -> usize + Send + Sync>>>>,
+    memory: Arc<Mutex<Vec<FreeMemory>>>,
 }
 
 impl DeviceMonitor {
