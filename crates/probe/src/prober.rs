@@ -228,10 +228,7 @@ impl Prober {
     /// Images as they leave a sampler, and g_s.
     fn encoded(&mut self, work: &SampleWork) -> Result<(Vec<EncodedImage>, f64), ProbeError> {
         if self.is_first(&format!("sample {} {:?} {}", work.sampling, work.planes, work.lighting)) {
-            // The fewest images of a set that can be sampled alone.
-            let is_independent = self.engine.images_are_independent(&work.sampling)?;
-            let wanted = if is_independent { vec![0] } else { work.wanted.clone() };
-            self.engine.sample(&SampleWork { wanted, ..work.clone() }, self.turn)?;
+            self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
         }
         let (encoded, seconds) = own_time(self.engine.as_ref(), || {
             let images = self.engine.sample(work, self.turn)?;
@@ -241,6 +238,12 @@ impl Prober {
         let encoded = encoded?;
         let sample_image_s = seconds / encoded.len().max(1) as f64;
         Ok((encoded, sample_image_s))
+    }
+
+    /// The fewest images of a set that can be sampled alone.
+    fn fewest(&self, work: SampleWork) -> Result<SampleWork, ProbeError> {
+        let is_independent = self.engine.images_are_independent(&work.sampling)?;
+        Ok(if is_independent { SampleWork { wanted: vec![0], ..work } } else { work })
     }
 
     /// The set of a representation, at least.
