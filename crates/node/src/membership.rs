@@ -29,6 +29,7 @@ const WARM_UP_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Stays a member until `shutdown`; frames go on while the coordinator is away.
 pub async fn keep_membership(parts: Arc<NodeParts>, node: NodeStatus) {
+    let coordinator = &parts.config.coordinator;
     let mut backoff = Backoff::reconnect();
     let mut warmed = false;
     loop {
@@ -41,7 +42,7 @@ pub async fn keep_membership(parts: Arc<NodeParts>, node: NodeStatus) {
         if joined {
             backoff.reset();
         }
-        tracing::warn!(node = node.node_name, coordinator = %parts.config.coordinator, reason = ended.message(), "no longer a member");
+        tracing::warn!(node = node.node_name, %coordinator, reason = ended.message(), "no longer a member");
         tokio::select! {
             () = tokio::time::sleep(backoff.next_delay()) => (),
             () = parts.shutdown.cancelled() => return,

@@ -57,10 +57,8 @@ impl rpc::Node for NodeService {
         if let Some(budget) = request.budget.clone() {
             return self.measure_for_budget(request, budget).await;
         }
-        request
-            .typical_views
-            .chunks(1)
-            .try_for_each(|view| self.node.config.quotas.check_views(view, request.planes))?;
+        let quotas = self.node.config.quotas;
+        request.typical_views.chunks(1).try_for_each(|view| quotas.check_views(view, request.planes))?;
         let known =
             self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| measured.clone());
         // What is measured in the background was measured before, beside other work.
