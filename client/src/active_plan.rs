@@ -154,23 +154,15 @@ pub(crate) async fn follow_coordinator(
             backoff.reset();
             take_over(event, &state, &mut is_new_session);
         }
-        events = reopen(&coordinator, &request, &mut backoff).await;
+        events = loop {
+            tokio::time::sleep(backoff.next_delay()).await;
+            let request = request.lock().clone();
+            match coordinator.open_session(request).await {
+                Ok(events) => break events,
+                Err(status) => tracing::debug!(reason = status.message(), "the coordinator is away"),
+            }
+        };
         is_new_session = true;
-    }
-}
-
-async fn reopen(
-    coordinator: &CoordinatorClient,
-    request: &Mutex<SessionRequest>,
-    backoff: &mut Backoff,
-) -> Messages<SessionEvent> {
-    loop {
-        tokio::time::sleep(backoff.next_delay()).await;
-        let request = request.lock().clone();
-        match coordinator.open_session(request).await {
-            Ok(events) => return events,
-            Err(status) => tracing::debug!(reason = status.message(), "the coordinator is away"),
-        }
     }
 }
 

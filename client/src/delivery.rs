@@ -124,7 +124,7 @@ async fn receive_all(
     let parts = peer.client.render_views(messages).await.map_err(|status| Failure::of_status(&peer, &status))?;
     let mut frames = FrameStream::new(parts);
     let mut decoding = JoinSet::new();
-    while let Some((frame, room)) = frames.next_admitted(&peer, &sink, plan_epoch).await? {
+    while let Some((frame, room)) = frames.next(&peer, Some((&sink, plan_epoch))).await? {
         received(frame.header.stage_times.set_wait_s > SET_WAIT_S);
         let Ok(decoder) = sink.decoders.clone().acquire_owned().await else { break };
         let peer = peer.clone();

@@ -89,7 +89,7 @@ fn units(bytes: usize) -> u32 {
 }
 
 /// A frame for the caller, or the error that ends its request.
-type Received = Result<(Frame, FrameRoom), ClientError>;
+type Received = Result<(Frame, Option<FrameRoom>), ClientError>;
 
 /// Takes the frames of one request. Clones share them.
 #[derive(Clone)]
@@ -128,7 +128,7 @@ impl FrameSink {
     }
 
     /// Passes a frame on; a frame that was received twice counts once.
-    pub(crate) fn pass_on(&self, frame: u64, header: FrameHeader, view: View, room: FrameRoom) {
+    pub(crate) fn pass_on(&self, frame: u64, header: FrameHeader, view: View, room: Option<FrameRoom>) {
         let Some(request) = self.window.lock().take(frame) else { return };
         // The channel has a place for every frame that has room: an error means that the caller has left.
         let _ = self.received.try_send(Ok((Frame { request, view, header }, room)));

@@ -27,4 +27,4 @@ pub use live_view::{EncodedLiveView, LiveView};
 pub use placement::ClientId;
 pub use session::{Client, Session};
 pub use view_queue::{Message, ViewQueue};
-pub use view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, PictureQuality, ViewRequest};
+pub use view_request::{EncodedFrame, Frame, LiveFrame, PictureQuality, ViewRequest};

@@ -15,7 +15,7 @@ use crate::error::ClientError;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{ClientId, Tried};
 use crate::poses::{Newest, Poses, SentPose};
-use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
+use crate::view_request::{EncodedFrame, Frame, LiveFrame, ViewRequest};
 use crate::window::check_frame;
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
@@ -23,21 +23,14 @@ const HEARTBEAT: Duration = Duration::from_secs(20);
 /// The delay before compositors that failed are tried again, where no other plan is in force by then.
 const RETRY: Duration = Duration::from_millis(200);
 
-/// A frame before it is decoded.
-#[derive(Debug)]
-pub(crate) struct Encoded {
-    frame: WholeFrame,
-    /// The pose that it answers.
-    answers: SentPose,
-    received: Instant,
-    peer: Peer,
-}
+/// A frame before it is decoded, and the compositor that has sent it; or the error that ends its view.
+pub(crate) type Received = Result<(EncodedFrame, Peer), ClientError>;
 
 pub(crate) struct LiveStream {
     state: watch::Receiver<SessionState>,
     newest: watch::Receiver<Newest>,
     client_id: u64,
-    frames: mpsc::Sender<Result<Encoded, ClientError>>,
+    frames: mpsc::Sender<Received>,
     poses: Poses,
     /// The plan of the last frame: epochs rise.
     plan_epoch: u64,
@@ -71,7 +64,7 @@ impl LiveStream {
         client: ClientId,
         state: watch::Receiver<SessionState>,
         newest: watch::Receiver<Newest>,
-        frames: mpsc::Sender<Result<Encoded, ClientError>>,
+        frames: mpsc::Sender<Received>,
     ) {
         let client_id = client.0;
         let poses = Poses::default();
@@ -116,7 +109,8 @@ impl LiveStream {
     /// Waits until there is another plan, or the same may be tried again.
     async fn wait_for_others(&mut self, tried: Tried) -> Result<Tried, ClientError> {
         let is_over = self.failing_since.get_or_insert_with(Instant::now).elapsed() > GIVE_UP_AFTER;
-        if tried.is_exhausted() || is_over {
+        let has_no_room = tried.last.is_some() && !tried.has_failed_with_room;
+        if has_no_room || is_over {
             return Err(tried.last.unwrap_or_else(|| ClientError::ended("the plan has no compositor")));
         }
         match timeout(RETRY, self.state.changed()).await {
@@ -150,8 +144,8 @@ impl LiveStream {
                     // The other direction gives the reason.
                     Err(_) => call.is_due = false,
                 },
-                frame = call.frames.next(&call.peer) => match frame? {
-                    Some(frame) => self.accept(frame, &call.peer)?,
+                frame = call.frames.next(&call.peer, None) => match frame? {
+                    Some((frame, _)) => self.accept(frame, &call.peer)?,
                     None => return Err(Failure::OfPlan(call.peer.error("ended the stream"))),
                 },
             }
@@ -207,8 +201,13 @@ impl LiveStream {
         }
         (self.plan_epoch, self.failing_since) = (plan_epoch, None);
         tracing::debug!(client = self.client_id, frame = number, set = %frame.header.sample_set_id, "received");
-        let encoded = Encoded { frame, answers, received: Instant::now(), peer: peer.clone() };
-        let passed_on = self.frames.try_send(Ok(encoded));
+        let SentPose { pose, sent } = answers;
+        let WholeFrame { header, data, .. } = frame;
+        let node_name = peer.share.node_name.clone();
+        let received = Instant::now();
+        let encoded =
+            EncodedFrame { request: pose.request, header, data, node_name, posed: pose.posed, sent, received };
+        let passed_on = self.frames.try_send(Ok((encoded, peer.clone())));
         passed_on.map_err(|_| Failure::OfPlan(peer.error("sends more frames than are taken")))
     }
 }
@@ -233,12 +232,12 @@ fn closed() -> ClientError {
 
 /// Decodes one frame after the other, so that they keep their order.
 pub(crate) async fn decode_all(
-    mut encoded: mpsc::Receiver<Result<Encoded, ClientError>>,
+    mut encoded: mpsc::Receiver<Received>,
     decoded: mpsc::Sender<Result<LiveFrame, ClientError>>,
 ) {
     while let Some(received) = encoded.recv().await {
         let frame = match received {
-            Ok(encoded) => encoded.decode().await,
+            Ok((encoded, peer)) => decode_live(encoded, &peer).await,
             Err(error) => Err(error),
         };
         let is_over = frame.is_err();
@@ -248,19 +247,8 @@ pub(crate) async fn decode_all(
     }
 }
 
-impl Encoded {
-    /// The frame as it came.
-    pub(crate) fn into_frame(self) -> EncodedFrame {
-        let Self { frame, answers: SentPose { pose, sent }, received, peer } = self;
-        let WholeFrame { header, data, .. } = frame;
-        let node_name = peer.share.node_name;
-        EncodedFrame { request: pose.request, header, data, node_name, posed: pose.posed, sent, received }
-    }
-
-    async fn decode(self) -> Result<LiveFrame, ClientError> {
-        let Self { frame, answers: SentPose { pose, sent }, received, peer } = self;
-        let (header, view) = decode(frame, &peer).await?;
-        let times = LiveTimes { posed: pose.posed, sent, received, decoded: Instant::now() };
-        Ok(LiveFrame { frame: Frame { request: pose.request, view, header }, times })
-    }
+async fn decode_live(encoded: EncodedFrame, peer: &Peer) -> Result<LiveFrame, ClientError> {
+    let EncodedFrame { request, header, data, posed, sent, received, .. } = encoded;
+    let (header, view) = decode(WholeFrame { frame: request.frame, header, data }, peer).await?;
+    Ok(LiveFrame { frame: Frame { request, view, header }, posed, sent, received, decoded: Instant::now() })
 }

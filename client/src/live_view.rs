@@ -8,7 +8,7 @@ use tokio::task::JoinSet;
 
 use crate::active_plan::SessionState;
 use crate::error::ClientError;
-use crate::live_stream::{Encoded, LiveStream, decode_all};
+use crate::live_stream::{LiveStream, Received, decode_all};
 use crate::placement::ClientId;
 use crate::poses::{CREDITS, Newest, Pose};
 use crate::view_request::{EncodedFrame, LiveFrame, PictureQuality, ViewRequest};
@@ -33,7 +33,7 @@ pub struct EncodedLiveView {
     _tasks: JoinSet<()>,
 }
 
-type EncodedFrames = mpsc::Receiver<Result<Encoded, ClientError>>;
+type EncodedFrames = mpsc::Receiver<Received>;
 
 /// The poses of a view.
 #[derive(Debug)]
@@ -139,7 +139,7 @@ impl EncodedLiveView {
     /// # Errors
     /// As [`LiveView::next`].
     pub async fn next(&mut self) -> Result<EncodedFrame, ClientError> {
-        Ok(next(&mut self.frames).await?.into_frame())
+        Ok(next(&mut self.frames).await?.0)
     }
 
     /// All frames up to this number have been shown, or are of no use. Others come only then.

@@ -114,34 +114,23 @@ impl FrameStream {
         Self { parts, assembly: FrameAssembly::default() }
     }
 
-    /// The next whole frame of `peer`; `None` at the stream's end. Can be dropped and called again without losing a frame.
-    pub(crate) async fn next(&mut self, peer: &Peer) -> Result<Option<WholeFrame>, Failure> {
-        while let Some(part) = self.next_part(peer).await? {
-            if let Some(frame) = self.assembly.push(part).map_err(|error| Failure::of_fault(peer, error))? {
-                return Ok(Some(frame));
-            }
-        }
-        self.assembly.finish().map_err(|error| Failure::of_fault(peer, error))?;
-        Ok(None)
-    }
-
-    /// The next whole frame that is due, and its room, which it has before its first bytes are kept.
-    pub(crate) async fn next_admitted(
+    /// The next whole frame of `peer`; `None` at the stream's end. A sink admits frames of a plan's epoch: a frame then has its
+    /// room before its first bytes are kept. Without a sink it can be dropped and called again without losing a frame.
+    pub(crate) async fn next(
         &mut self,
         peer: &Peer,
-        sink: &FrameSink,
-        plan_epoch: u64,
-    ) -> Result<Option<(WholeFrame, FrameRoom)>, Failure> {
+        admission: Option<(&FrameSink, u64)>,
+    ) -> Result<Option<(WholeFrame, Option<FrameRoom>)>, Failure> {
         let mut room = None;
         while let Some(part) = self.next_part(peer).await? {
-            if let Some(header) = &part.header {
+            if let (Some((sink, plan_epoch)), Some(header)) = (admission, &part.header) {
                 // Whoever waits for room has none: two compositors would wait for each other.
                 drop(room.take());
                 let admitted = sink.admit(part.frame, header, plan_epoch).await;
                 room = Some(admitted.map_err(|fault| Failure::of_fault(peer, fault))?);
             }
             if let Some(frame) = self.assembly.push(part).map_err(|error| Failure::of_fault(peer, error))? {
-                return Ok(room.map(|room| (frame, room)));
+                return Ok(Some((frame, room)));
             }
         }
         self.assembly.finish().map_err(|error| Failure::of_fault(peer, error))?;

@@ -58,7 +58,7 @@ pub(crate) struct Tried {
     names: HashSet<String>,
     pub(crate) last: Option<ClientError>,
     /// One of them failed for another reason than that it had no room.
-    has_failed_with_room: bool,
+    pub(crate) has_failed_with_room: bool,
 }
 
 impl Tried {
@@ -72,11 +72,6 @@ impl Tried {
     pub(crate) fn next<'a>(&self, client_id: u64, active: &'a ActivePlan) -> Option<&'a Peer> {
         let weights: Vec<u32> = active.peers.iter().map(|peer| peer.share.view_weight).collect();
         order(client_id, &weights).map(|at| &active.peers[at]).find(|peer| !self.names.contains(&peer.share.node_name))
-    }
-
-    /// Whether all compositors that were tried had no room.
-    pub(crate) fn is_exhausted(&self) -> bool {
-        !self.has_failed_with_room && !self.names.is_empty()
     }
 }
 

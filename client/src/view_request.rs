@@ -74,8 +74,14 @@ pub struct Frame {
 pub struct LiveFrame {
     /// The frame; its number rises.
     pub frame: Frame,
-    /// Times on this machine. Those elsewhere are in the frame's header.
-    pub times: LiveTimes,
+    /// The pose was given, by the clock of this machine. Times elsewhere are in the frame's header.
+    pub posed: Instant,
+    /// The pose was sent.
+    pub sent: Instant,
+    /// The frame was received.
+    pub received: Instant,
+    /// The frame was decoded.
+    pub decoded: Instant,
 }
 
 /// A frame of a camera that moves, as it came. Its checksum has been verified.
@@ -95,17 +101,4 @@ pub struct EncodedFrame {
     pub sent: Instant,
     /// The frame was received, by the clock of this machine.
     pub received: Instant,
-}
-
-/// Times on this machine.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LiveTimes {
-    /// The pose was given.
-    pub posed: Instant,
-    /// The pose was sent.
-    pub sent: Instant,
-    /// The frame was received.
-    pub received: Instant,
-    /// The frame was decoded.
-    pub decoded: Instant,
 }

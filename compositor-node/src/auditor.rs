@@ -4,10 +4,10 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ProbedView};
+use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ViewErrors};
 use depth_image::{ViewPart, ViewPlanes};
 use glam::UVec2;
-use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, ViewProbes, ViewWork, blocking};
+use node::{DirectWork, NodeParts, Pinned, Reason, ViewAudit, ViewProbes, ViewWork, blocking};
 use parking_lot::Mutex;
 use tonic::Status;
 
@@ -22,12 +22,8 @@ const PART_PX: u32 = 128;
 
 /// The audits of one compositor. One is under way at a time.
 pub(crate) struct Auditor {
-    pub(crate) scenes: Arc<Scenes>,
+    pub(crate) node: Arc<NodeParts>,
     pub(crate) probes: Arc<dyn ViewProbes>,
-    pub(crate) plans: PlansInForce,
-    pub(crate) metrics: NodeMetrics,
-    /// The share of the time for all views that are drawn beside a plan.
-    pub(crate) direct_share: f64,
     pub(crate) choice: Mutex<AuditChoice>,
 }
 
@@ -43,17 +39,19 @@ impl Auditor {
     /// Takes note of views that were made together, and begins the audit of one of them where that is due.
     pub(crate) fn note(self: &Arc<Self>, made: &[Waiting]) {
         let Some(key) = made.first().map(|waiting| &waiting.key) else { return };
-        let Some(plan) = self.plans.in_force(key.workload_number) else { return };
+        let Some(plan) = self.node.plans.in_force(key.workload_number) else { return };
         let Some(order) = plan.audit.filter(|_| key.sample_set_id.plan_epoch == plan.plan_epoch) else { return };
         let mut covered = Vec::new();
         for waiting in made {
             match uncovered(&plan, &order, waiting) {
                 None => covered.push(waiting),
-                Some(reason) => self.metrics.uncover_view(reason),
+                Some(reason) => {
+                    self.node.metrics.uncovered_views.get_or_create(&Reason { reason }).inc();
+                }
             }
         }
         let counts = [covered.len(), made.len() - covered.len()].map(|count| count as u64);
-        self.metrics.done.covered(plan.workload_number, counts);
+        self.node.metrics.done.covered(plan.workload_number, counts);
         if let Some(chosen) = self.choose(&plan, &order, &covered) {
             tokio::spawn(self.clone().audit(chosen, order));
         }
@@ -62,7 +60,7 @@ impl Auditor {
     /// The views are of one set, as views that are made together are.
     fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<Chosen> {
         let first = covered.first()?;
-        let Source::Sets(ViewSets { of_cell: set, .. }) = &first.source else { return None };
+        let Source::Sets(ViewSets { of_cell: set, .. }) = &first.set.source else { return None };
         let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
         let candidates = covered.iter().map(|waiting| {
             let stream = waiting.reply.outbox().stream;
@@ -88,18 +86,18 @@ impl Auditor {
         let busy_s = match compared {
             Ok((errors, busy_s)) => {
                 let view = AuditedView { plan_epoch, stream, camera, errors, is_part };
-                self.metrics.done.audited(workload_number, view, busy_s);
-                self.metrics.audited_views.inc();
-                self.metrics.audit_s.inc_by(busy_s);
+                self.node.metrics.done.audited(workload_number, view, busy_s);
+                self.node.metrics.audited_views.inc();
+                self.node.metrics.audit_s.inc_by(busy_s);
                 Some(busy_s)
             }
             Err(status) => {
                 tracing::debug!(reason = status.message(), "a view is not audited");
-                self.metrics.failed_audits.inc();
+                self.node.metrics.failed_audits.inc();
                 None
             }
         };
-        let share = order.time_ratio.min(self.direct_share);
+        let share = order.time_ratio.min(self.node.config.direct_share);
         // Another number: the chosen one is the least of several.
         let random = self::random([random, workload_number, plan_epoch]);
         let ended = Ended { kind, busy_s, wall_s: start.elapsed().as_secs_f64(), random };
@@ -111,13 +109,13 @@ impl Auditor {
         chosen: Chosen,
         order: AuditOrder,
         part: ViewPart,
-    ) -> Result<(ProbedView, f64), Status> {
+    ) -> Result<(ViewErrors, f64), Status> {
         let Chosen { plan, set, view: Candidate { camera, .. }, scene_time_s } = chosen;
         let scene = &plan.workload.scene;
-        if !self.scenes.engine().has_scene(scene.hash.as_str()) {
+        if !self.node.engine.has_scene(scene.hash.as_str()) {
             // Loading may take minutes: the set is not kept for it.
             drop(set);
-            self.scenes.ensure(scene).await?;
+            self.node.ensure_scene(scene).await?;
             return Err(Status::unavailable("the scene was not loaded"));
         }
         // As a certificate's views are: without the exposure and the curve of a client.
@@ -154,12 +152,12 @@ fn audited_part(view_px: UVec2, order: &AuditOrder, random: u64) -> ViewPart {
 /// Why a promise is not for a view; `None` where it is.
 fn uncovered(plan: &Assignment, order: &AuditOrder, waiting: &Waiting) -> Option<&'static str> {
     let key = &waiting.key;
-    let Source::Sets(ViewSets { of_cell: set, .. }) = &waiting.source else { return Some("drawn directly") };
+    let Source::Sets(ViewSets { of_cell: set, .. }) = &waiting.set.source else { return Some("drawn directly") };
     let pixels = f64::from(key.size_px.element_product()) / f64::from(order.planned_pixel_count);
     let refinement = plan.workload.refinement(set_index(key));
     let reasons = [
         (Some(&key.method) != plan.method.as_ref(), "another method"),
-        (waiting.place.is_neighbour, "another view cell's set"),
+        (waiting.set.place.is_neighbour, "another view cell's set"),
         (refinement.step + 1 < refinement.steps, "unfinished light"),
         (key.planes.antialias != order.antialias, "other samples a pixel"),
         (!(MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&pixels), "another size"),

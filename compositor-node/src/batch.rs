@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SceneRef, SetContent};
+use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SetContent};
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
@@ -15,8 +15,6 @@ use crate::view_times::ViewKind;
 
 /// Views of one call to the device.
 pub(crate) const MAX_BATCH: usize = 64;
-/// Pixels of one call, times their samples: 64 views of full HD would hold half a gigabyte.
-const MAX_BATCH_PIXELS: usize = 64 << 20;
 
 /// The kind of views that are drawn with few rays until their set is there.
 const PREVIEW: &str = "preview";
@@ -46,12 +44,6 @@ impl BatchKey {
         let antialias = self.planes.antialias;
         ViewKind { workload_number: self.workload_number, method: method.to_owned(), antialias }
     }
-
-    /// The most views of one call to the device.
-    pub(crate) fn max_views(&self) -> usize {
-        let samples = self.size_px.element_product() as usize * self.planes.antialias.samples() as usize;
-        (MAX_BATCH_PIXELS / samples.max(1)).clamp(1, MAX_BATCH)
-    }
 }
 
 /// The source of views.
@@ -61,24 +53,6 @@ pub(crate) enum Source {
     Sets(ViewSets),
     /// The scene itself.
     Scene { plan: Arc<Assignment>, scene_time_s: f32 },
-}
-
-impl Source {
-    /// The scene that surfaces, or all of the views, are drawn from.
-    pub(crate) fn scene(&self) -> &SceneRef {
-        match self {
-            Self::Sets(sets) => &sets.of_cell.scene,
-            Self::Scene { plan, .. } => &plan.workload.scene,
-        }
-    }
-
-    /// The age of the set at `now`; 0 where views are drawn from the scene.
-    pub(crate) fn age_s(&self, now: Instant) -> f64 {
-        match self {
-            Self::Sets(sets) => now.saturating_duration_since(sets.of_cell.since).as_secs_f64(),
-            Self::Scene { .. } => 0.0,
-        }
-    }
 }
 
 /// The name of a view's source.
@@ -112,12 +86,10 @@ pub(crate) struct Loaded {
 /// A view that waits for the device, with the way back to its client.
 pub(crate) struct Waiting {
     pub(crate) key: BatchKey,
-    pub(crate) place: Place,
-    pub(crate) source: Source,
+    pub(crate) set: Loaded,
     pub(crate) view: RequestedView,
     pub(crate) codec: FrameCodec,
     pub(crate) arrived: Instant,
-    pub(crate) set_wait_s: f64,
     /// The time at which it was ready for the device.
     pub(crate) queued: Instant,
     pub(crate) reply: Reply,
@@ -143,15 +115,6 @@ impl Waiting {
             size_px: view.camera.size_px,
             is_preview: set.place.is_preview(),
         };
-        let source = set.source.clone();
-        let codec = request.codec;
-        let set_wait_s = set.wait_s;
-        let queued = Instant::now();
-        Self { key, place: set.place, source, view, codec, arrived, set_wait_s, queued, reply, credit }
-    }
-
-    /// The wait for room, before it was ready.
-    pub(crate) fn credit_wait_s(&self) -> f64 {
-        (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set_wait_s).max(0.0)
+        Self { key, set: set.clone(), view, codec: request.codec, arrived, queued: Instant::now(), reply, credit }
     }
 }

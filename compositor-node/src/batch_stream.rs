@@ -56,7 +56,7 @@ impl<'a> BatchStream<'a> {
     /// A client that waits for frames is not idle.
     async fn next(&self, requests: &mut Messages<RenderViews>) -> Result<Option<RenderViews>, Status> {
         loop {
-            let next = next_within(requests, self.client.shared.deadlines.idle, "views").await;
+            let next = next_within(requests, self.client.shared.node.config.deadlines.idle, "views").await;
             let is_late = next.as_ref().is_err_and(|status| status.code() == Code::DeadlineExceeded);
             if !is_late || self.credits.available_permits() == STREAM_PIXELS as usize {
                 return next;
@@ -68,7 +68,7 @@ impl<'a> BatchStream<'a> {
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let arrived = Instant::now();
         let shared = &self.client.shared;
-        let plan = shared.plans.require(request.workload_number, request.plan_epoch)?;
+        let plan = shared.node.plans.require(request.workload_number, request.plan_epoch)?;
         let plan = shared.of_compositor(plan, &request.method)?;
         shared.check_views(&plan, &request)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
@@ -142,7 +142,7 @@ impl<'a> BatchStream<'a> {
         match self.client.shared.quota.try_view(view_bytes(&view.camera, planes)) {
             Ok(node) => Ok(Some(Credit { stream, _node: node })),
             Err(refused) if !self.admitted => {
-                self.client.shared.metrics.drop_view("node full");
+                self.client.shared.node.metrics.drop_view("node full");
                 Err(refused)
             }
             Err(_) => Ok(None),

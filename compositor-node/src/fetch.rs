@@ -62,7 +62,14 @@ impl Fetcher {
             && let Err(NotFetched { status, .. }) = self.fetch_all(set, vec![request], &mut gathered).await
         {
             tracing::info!(plan_epoch = plan.plan_epoch, reason = status.message(), "samplers in place of a relay");
-            self.relay_failed(plan.plan_epoch, &status);
+            // A relay that refuses one set may relay the next.
+            if status.code() != Code::FailedPrecondition {
+                let mut failed = self.failed_relay_epochs.lock();
+                failed.insert(plan.plan_epoch);
+                while failed.len() > MAX_WORKLOADS {
+                    failed.pop_first();
+                }
+            }
         }
         let missing = self.requests_to_samplers(set, &gathered.images);
         self.fetch_all(set, missing, &mut gathered).await?;
@@ -70,18 +77,6 @@ impl Fetcher {
             return Err(Status::data_loss(format!("sample set {} is not complete", set.set_index)).into());
         };
         Ok((images, gathered.times))
-    }
-
-    /// A relay that refuses one set may relay the next.
-    fn relay_failed(&self, plan_epoch: u64, status: &Status) {
-        if status.code() == Code::FailedPrecondition {
-            return;
-        }
-        let mut failed = self.failed_relay_epochs.lock();
-        failed.insert(plan_epoch);
-        while failed.len() > MAX_WORKLOADS {
-            failed.pop_first();
-        }
     }
 
     /// All images, from the relay of this compositor; `None` without one, or where it has failed.
@@ -113,8 +108,9 @@ impl Fetcher {
     async fn in_vain(&self, set: &SetRequest, content: &SetContent, share: &SamplerShare) {
         let ends = self.plans.until(set.plan.workload_number, |plan| {
             plan.is_none_or(|plan| {
+                let samples = plan.samplers.iter().any(|sampler| sampler.node_name == share.node_name);
                 plan.plan_epoch != set.plan.plan_epoch
-                    && !(has_place(plan, &share.node_name) && has_set(plan, content, set.set_index))
+                    && !((plan.composites(&share.node_name) || samples) && has_set(plan, content, set.set_index))
             })
         });
         ends.await;
@@ -137,7 +133,11 @@ impl Fetcher {
                     fetched = fetch_share(&fetcher.connections, &set, &request) => {
                         fetched.map_err(|status| not_fetched(request.share, &status))
                     }
-                    () = fetcher.in_vain(&set, &content, &request.share) => Err(given_up(&set.plan).into()),
+                    () = fetcher.in_vain(&set, &content, &request.share) => {
+                        let Assignment { plan_epoch, workload_number, .. } = &*set.plan;
+                        let replaced = format!("plan_epoch {plan_epoch} of workload {workload_number} was replaced");
+                        Err(Status::failed_precondition(replaced).into())
+                    }
                 }
             });
         }
@@ -148,15 +148,6 @@ impl Fetcher {
         }
         Ok(())
     }
-}
-
-fn given_up(plan: &Assignment) -> Status {
-    let Assignment { plan_epoch, workload_number, .. } = plan;
-    Status::failed_precondition(format!("plan_epoch {plan_epoch} of workload {workload_number} was replaced"))
-}
-
-fn has_place(plan: &Assignment, node_name: &str) -> bool {
-    plan.composites(node_name) || plan.samplers.iter().any(|share| share.node_name == node_name)
 }
 
 /// The images of a set from those that were sampled: the same, or joined from tiles.

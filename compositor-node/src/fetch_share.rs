@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SamplerShare};
 use codec::{Chunk, DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_sample_image};
-use depth_image::{LightPlanes, SampleCamera, SampleImage, SpecularPlanes};
+use depth_image::{LightPlanes, SampleImage, SpecularPlanes};
 use node::{CellPlan, Connections, blocking, next_within};
 use tonic::{Code, Status};
 use wire::rpc::{Backoff, Messages, SamplerClient};
@@ -109,7 +109,13 @@ async fn fetch_once(
         let index = whole.image_index;
         let encoded = whole.image.clone();
         let start = Instant::now();
-        let image = decode(&cameras, whole).await?;
+        let camera = cameras.get(index as usize).copied();
+        let camera = camera.ok_or_else(|| Status::data_loss(format!("image {index} has no camera")))?;
+        let decoding = blocking(move || {
+            decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &DecodeLimits::default())
+                .map_err(|error| Status::data_loss(error.to_string()))
+        });
+        let image = decoding.await?;
         chunks.times.decode_s += start.elapsed().as_secs_f64();
         check_planes(plan, index, &image)?;
         set.relay.iter().for_each(|relay| relay.add(index, encoded.clone()));
@@ -199,14 +205,4 @@ fn check_planes(plan: &Assignment, index: u32, image: &SampleImage) -> Result<()
         return Ok(());
     };
     Err(Status::data_loss(format!("image {index} has {fault}")))
-}
-
-async fn decode(cameras: &[SampleCamera], whole: Reassembled) -> Result<SampleImage, Status> {
-    let camera = cameras.get(whole.image_index as usize).copied();
-    let camera = camera.ok_or_else(|| Status::data_loss(format!("image {} has no camera", whole.image_index)))?;
-    let decoding = blocking(move || {
-        let image = decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &DecodeLimits::default());
-        image.map_err(|error| Status::data_loss(error.to_string()))
-    });
-    decoding.await
 }

@@ -22,7 +22,7 @@ use wire::rpc::Messages;
 use crate::batch::{Loaded, Place, Waiting};
 use crate::course::Course;
 use crate::outbox::Reply;
-use crate::quota::{Credit, closed};
+use crate::quota::{Credit, closed, wait_for};
 use crate::sets::RECENTLY;
 use crate::shared::ClientStream;
 
@@ -119,7 +119,7 @@ impl<'a> LiveStream<'a> {
             course: Course::default(),
             aside: None,
             _viewer: client.shared.arrivals.viewers.clone(),
-            _on_device: client.shared.sets.scenes.engine().live_stream(),
+            _on_device: client.shared.node.engine.live_stream(),
         }
     }
 
@@ -128,7 +128,7 @@ impl<'a> LiveStream<'a> {
         first: RenderViews,
         mut requests: Messages<RenderViews>,
     ) -> Result<(), Status> {
-        let idle = self.client.shared.deadlines.idle;
+        let idle = self.client.shared.node.config.deadlines.idle;
         let mut is_open = true;
         self.accept(first)?;
         while is_open || self.newest.is_some() || self.loading.is_some() || self.ready.is_some() {
@@ -145,7 +145,7 @@ impl<'a> LiveStream<'a> {
                     Err(status) => self.not_loaded(status)?,
                 },
                 credit = wait_for(self.ready.as_mut().map(|ready| &mut ready.credit)) => self.credited(credit?),
-                () = until(patience) => self.show_neighbour(),
+                () = wait_for(patience.map(|time| tokio::time::sleep_until(time.into()))) => self.show_neighbour(),
             }
         }
         Ok(())
@@ -159,7 +159,9 @@ impl<'a> LiveStream<'a> {
         let Some(&view) = request.views.first() else {
             return Ok(());
         };
-        self.check_number(view.frame)?;
+        if let Some(last) = self.last_frame.replace(view.frame).filter(|last| view.frame <= *last) {
+            return Err(Status::invalid_argument(format!("views.frame_number: {} comes after {last}", view.frame)));
+        }
         self.client.shared.check_views(&plan, &request)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
@@ -172,7 +174,7 @@ impl<'a> LiveStream<'a> {
             "requested"
         );
         self.course.add(pose.arrived, &pose.view.camera);
-        let done = &self.client.shared.metrics.done;
+        let done = &self.client.shared.node.metrics.done;
         done.viewer_moved(self.client.stream, pose.request.workload_number, pose.view.camera);
         self.fetch_ahead(&pose);
         self.has_tried = false;
@@ -221,20 +223,11 @@ impl<'a> LiveStream<'a> {
         }
     }
 
-    fn check_number(&mut self, frame: u64) -> Result<(), Status> {
-        match self.last_frame.replace(frame) {
-            Some(last) if frame <= last => {
-                Err(Status::invalid_argument(format!("views.frame_number: {frame} comes after {last}")))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// The plan in force for a request. A stream goes on from plan to plan of its workload, whatever its cells and roles. A
     /// request of the plan before does not know the method of a new one.
     fn plan_of(&self, request: &mut RenderViews) -> Result<Arc<Assignment>, Status> {
         let shared = &self.client.shared;
-        let plan = shared.plans.follow(request.workload_number, request.plan_epoch)?;
+        let plan = shared.node.plans.follow(request.workload_number, request.plan_epoch)?;
         if let Some(method) = plan.method.as_ref().filter(|_| plan.plan_epoch > request.plan_epoch)
             && request.method != DIRECT
         {
@@ -246,7 +239,7 @@ impl<'a> LiveStream<'a> {
     fn count_replaced(&self, older: Option<RequestedView>) {
         if let Some(older) = older {
             tracing::debug!(stream = self.client.stream, frame = older.frame, "replaced by a newer pose");
-            self.client.shared.metrics.drop_view("newer pose");
+            self.client.shared.node.metrics.drop_view("newer pose");
         }
     }
 
@@ -284,7 +277,7 @@ impl<'a> LiveStream<'a> {
     /// fetched again when one does.
     fn not_loaded(&mut self, status: Status) -> Result<(), Status> {
         let Some(mut pose) = self.loading.take().and_then(|fetch| fetch.pose) else { return Ok(()) };
-        self.client.shared.metrics.wanted_fetches_ended.inc();
+        self.client.shared.node.metrics.wanted_fetches_ended.inc();
         let plan = self.plan_of(&mut pose.request)?;
         if plan.plan_epoch == pose.plan.plan_epoch {
             return Err(status);
@@ -330,7 +323,7 @@ impl<'a> LiveStream<'a> {
         };
         let in_motion = pose.request.live.is_some_and(|live| !live.waits_for_set);
         let since = self.without_set.filter(|_| in_motion && may_show_other && !self.has_tried)?;
-        Some(since + self.client.shared.deadlines.neighbour)
+        Some(since + self.client.shared.node.config.deadlines.neighbour)
     }
 
     /// Makes the newest pose's view where its own set is loaded while another is being fetched; gives whether it is.
@@ -405,21 +398,5 @@ impl<'a> LiveStream<'a> {
             let stream = credits.acquire_owned().await.map_err(closed)?;
             Ok(Credit { stream, _node: shared.quota.live_view(bytes).await? })
         })
-    }
-}
-
-/// Waits for the work; without any, waits for ever.
-async fn wait_for<T>(work: Option<&mut Pending<T>>) -> Result<T, Status> {
-    match work {
-        Some(work) => work.await,
-        None => std::future::pending().await,
-    }
-}
-
-/// Waits for a time; without any, waits for ever.
-async fn until(time: Option<Instant>) {
-    match time {
-        Some(time) => tokio::time::sleep_until(time.into()).await,
-        None => std::future::pending().await,
     }
 }

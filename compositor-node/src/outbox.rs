@@ -159,30 +159,6 @@ impl Outbox {
         let parts: Box<dyn Iterator<Item = FramePart> + Send> = Box::new(FramePart::cut(frame, header, data));
         Current { frame, parts: parts.peekable(), credit }
     }
-
-    fn poll(&self, cx: &Context<'_>) -> Poll<Option<Result<FramePart, Status>>> {
-        let mut state = self.state.lock();
-        let part = self.next_part(&mut state);
-        let is_left = state.current.is_some() || !state.ready.is_empty();
-        state.untaken_since = is_left.then(Instant::now);
-        if let Some(part) = part {
-            return Poll::Ready(Some(Ok(part)));
-        }
-        match &mut state.end {
-            None => {
-                state.waker = Some(cx.waker().clone());
-                Poll::Pending
-            }
-            Some(end) => Poll::Ready(std::mem::replace(end, Ok(())).err().map(Err)),
-        }
-    }
-
-    fn leave(&self) {
-        self.gone.cancel();
-        let mut state = self.state.lock();
-        self.drop_ready(&mut state, "client gone");
-        (state.current, state.unacknowledged) = (None, VecDeque::new());
-    }
 }
 
 impl State {
@@ -230,13 +206,29 @@ impl Stream for Outgoing {
     type Item = Result<FramePart, Status>;
 
     fn poll_next(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        self.0.poll(cx)
+        let mut state = self.0.state.lock();
+        let part = self.0.next_part(&mut state);
+        let is_left = state.current.is_some() || !state.ready.is_empty();
+        state.untaken_since = is_left.then(Instant::now);
+        if let Some(part) = part {
+            return Poll::Ready(Some(Ok(part)));
+        }
+        match &mut state.end {
+            None => {
+                state.waker = Some(cx.waker().clone());
+                Poll::Pending
+            }
+            Some(end) => Poll::Ready(std::mem::replace(end, Ok(())).err().map(Err)),
+        }
     }
 }
 
 impl Drop for Outgoing {
     fn drop(&mut self) {
-        self.0.leave();
+        self.0.gone.cancel();
+        let mut state = self.0.state.lock();
+        self.0.drop_ready(&mut state, "client gone");
+        (state.current, state.unacknowledged) = (None, VecDeque::new());
     }
 }
 

@@ -14,6 +14,8 @@ use crate::batch::{BatchKey, MAX_BATCH, Waiting};
 const SHARED_VIEWS: usize = 8;
 /// Pixels of these views.
 const SHARED_PIXELS: usize = 1 << 20;
+/// Pixels of one call, times their samples: 64 views of full HD would hold half a gigabyte.
+const MAX_BATCH_PIXELS: usize = 64 << 20;
 
 /// The ways to the device. Each has one call to it at a time, so that no view of a live stream waits for a call of a batch,
 /// and none for a long view of another stream.
@@ -36,10 +38,6 @@ pub(crate) enum Lane {
 impl Lane {
     pub(crate) const ALL: [Self; 6] =
         [Self::Live, Self::LongLive, Self::Batch, Self::LongBatch, Self::Direct, Self::Preview];
-
-    pub(crate) fn is_live(self) -> bool {
-        matches!(self, Self::Live | Self::LongLive | Self::Preview)
-    }
 }
 
 /// The views of all streams that wait for the device. Bounded: each view that waits holds a credit.
@@ -50,7 +48,7 @@ pub(crate) struct Arrivals {
     /// meanwhile.
     pub(crate) viewers: Arc<()>,
     /// Batches of the lanes that follow the plan.
-    served: AtomicU64,
+    pub(crate) served: AtomicU64,
 }
 
 #[derive(Default)]
@@ -69,11 +67,6 @@ impl Arrivals {
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
         self.lanes.iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
-    }
-
-    /// A count that rises with every batch of the lanes that follow the plan.
-    pub(crate) fn served(&self) -> u64 {
-        self.served.load(Ordering::Relaxed)
     }
 
     /// Waits for the next batch of a lane.
@@ -123,7 +116,9 @@ impl FairQueue {
             return Vec::new();
         };
         // While live streams are open, a pose may arrive at any time.
-        let most = most.min(if has_viewers { shared(&wanted) } else { wanted.max_views() });
+        let samples = wanted.size_px.element_product() as usize * wanted.planes.antialias.samples() as usize;
+        let most_of_call = (MAX_BATCH_PIXELS / samples.max(1)).clamp(1, MAX_BATCH);
+        let most = most.min(if has_viewers { shared(&wanted) } else { most_of_call });
         // The most views of each stream.
         let rounds = if order.len() == 1 { MAX_BATCH } else { shared(&wanted) };
         let first = self.take_round(&order, &wanted, most);
@@ -178,7 +173,7 @@ mod tests {
     use tokio::sync::Semaphore;
 
     use super::*;
-    use crate::batch::{Place, Source};
+    use crate::batch::{Loaded, Place, Source};
     use crate::outbox::{Outbox, Reply};
     use crate::quota::{Credit, NodeQuota};
     use crate::test_support::assignment;
@@ -198,14 +193,13 @@ mod tests {
         let node = NodeQuota::new(Quotas::default()).try_view(1).unwrap();
         let now = Instant::now();
         let place = Place { id: key.sample_set_id, cell: 0, is_neighbour: false, content: None };
+        let source = Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 };
         Waiting {
             key,
-            place,
-            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 },
+            set: Loaded { source, place, wait_s: 0.0 },
             view: RequestedView { frame: number.into(), camera },
             codec: FrameCodec::Lz4,
             arrived: now,
-            set_wait_s: 0.0,
             queued: now,
             reply: Reply::new(Outbox::new(stream, NodeMetrics::default())),
             credit: Credit { stream: permit, _node: node },

@@ -120,12 +120,7 @@ impl NodeQuota {
 
     /// Waits for bytes of `own` or of all, whichever are free first.
     async fn bytes(&self, own: &Pool, bytes: usize) -> Result<OwnedSemaphorePermit, Status> {
-        let of_own = async {
-            match own.price(bytes) {
-                Some(price) => own.free.clone().acquire_many_owned(price).await,
-                None => std::future::pending().await,
-            }
-        };
+        let of_own = wait_for(own.price(bytes).map(|price| own.free.clone().acquire_many_owned(price)));
         let of_all = self.common.free.clone().acquire_many_owned(self.common.price_at_most(bytes));
         tokio::select! {
             biased;
@@ -141,6 +136,14 @@ impl NodeQuota {
 
 fn room(count: usize) -> Arc<Semaphore> {
     Arc::new(Semaphore::new(count.clamp(1, u32::MAX as usize)))
+}
+
+/// Waits for the work; without any, waits for ever.
+pub(crate) async fn wait_for<F: Future>(work: Option<F>) -> F::Output {
+    match work {
+        Some(work) => work.await,
+        None => std::future::pending().await,
+    }
 }
 
 pub(crate) fn closed<E>(_: E) -> Status {

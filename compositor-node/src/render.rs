@@ -1,6 +1,7 @@
 //! The device's loops, one for each lane: batch by batch, while the frames of the batch before are encoded and sent.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
@@ -40,7 +41,8 @@ impl Rendering {
     pub(crate) async fn run(self, arrivals: Arc<Arrivals>, lane: Lane) {
         let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
         // Lanes of a class share the device evenly: long views delay others by a slice each.
-        let class = if lane.is_live() { WorkClass::Live } else { WorkClass::Batch };
+        let is_live = matches!(lane, Lane::Live | Lane::LongLive | Lane::Preview);
+        let class = if is_live { WorkClass::Live } else { WorkClass::Batch };
         let turn = Turn { class, flow: Turn::next_flow() };
         loop {
             // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
@@ -51,15 +53,15 @@ impl Rendering {
             batch.retain(|view| {
                 let is_wanted = !view.reply.outbox().gone.is_cancelled();
                 if !is_wanted {
-                    self.auditor.metrics.drop_view("client gone");
+                    self.auditor.node.metrics.drop_view("client gone");
                 }
                 is_wanted
             });
             if !batch.is_empty() {
-                let served = arrivals.served();
+                let served = arrivals.served.load(Ordering::Relaxed);
                 let busy_s = self.render(turn, batch, place).await;
-                if lane == Lane::Direct && arrivals.served() > served {
-                    tokio::time::sleep(pause(busy_s, self.auditor.direct_share)).await;
+                if lane == Lane::Direct && arrivals.served.load(Ordering::Relaxed) > served {
+                    tokio::time::sleep(pause(busy_s, self.auditor.node.config.direct_share)).await;
                 } else if lane == Lane::Preview {
                     tokio::time::sleep(pause(busy_s, PREVIEW_SHARE)).await;
                 }
@@ -70,7 +72,7 @@ impl Rendering {
     /// Gives the seconds that the views had the device.
     async fn render(&self, turn: Turn, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
         let start = Instant::now();
-        let metrics = &self.auditor.metrics;
+        let metrics = &self.auditor.node.metrics;
         match self.make(turn, &batch).await {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
@@ -100,16 +102,16 @@ impl Rendering {
 
     /// Makes the views of a batch, which has one at least; with the seconds that they had the device.
     async fn make(&self, turn: Turn, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
-        let source = batch[0].source.clone();
+        let source = batch[0].set.source.clone();
         let key = batch[0].key.clone();
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
-        let scene = source.scene().clone();
-        let operation = match &source {
-            Source::Sets(_) => Operation::ReconstructView,
-            Source::Scene { .. } => Operation::DirectView,
+        // The scene that surfaces, or all of the views, are drawn from.
+        let (scene, operation) = match &source {
+            Source::Sets(sets) => (sets.of_cell.scene.clone(), Operation::ReconstructView),
+            Source::Scene { plan, .. } => (plan.workload.scene.clone(), Operation::DirectView),
         };
-        let making = self.auditor.scenes.on_device(&scene, move |engine| {
+        let making = self.auditor.node.on_device(&scene, move |engine| {
             let (views, busy_s) = own_time(engine, || views_of(engine, &source, &key, &cameras, turn));
             Ok((views?, busy_s))
         });
@@ -136,7 +138,7 @@ impl Rendering {
                 return;
             };
             let times = stage_times(&waiting, start, batch_s, count);
-            let metrics = self.auditor.metrics.clone();
+            let metrics = self.auditor.node.metrics.clone();
             encodings.spawn(async move {
                 encode_and_send(waiting, view, times, &metrics).await;
                 drop(encoder);
@@ -178,12 +180,16 @@ fn pause(busy_s: f64, share: f64) -> Duration {
 /// The stage times of a view in a batch of `count` views that was begun at `start`.
 fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) -> StageTimes {
     let times = StageTimes {
-        set_wait_s: waiting.set_wait_s,
-        credit_wait_s: waiting.credit_wait_s(),
+        set_wait_s: waiting.set.wait_s,
+        credit_wait_s: (waiting.queued.saturating_duration_since(waiting.arrived).as_secs_f64() - waiting.set.wait_s)
+            .max(0.0),
         queue_s: start.saturating_duration_since(waiting.queued).as_secs_f64(),
         batch_s,
         reconstruct_s: batch_s / count as f64,
-        set_age_s: waiting.source.age_s(start),
+        set_age_s: match &waiting.set.source {
+            Source::Sets(sets) => start.saturating_duration_since(sets.of_cell.since).as_secs_f64(),
+            Source::Scene { .. } => 0.0,
+        },
         batch_count: count as u32,
         ..StageTimes::default()
     };
@@ -195,7 +201,7 @@ fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) ->
 }
 
 async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, metrics: &NodeMetrics) {
-    let Waiting { key, place, view: requested, codec, arrived, reply, credit, .. } = waiting;
+    let Waiting { key, set, view: requested, codec, arrived, reply, credit, .. } = waiting;
     let encoded = blocking(move || {
         let start = Instant::now();
         let encoded = encode_view(&view, codec).map_err(|error| Status::internal(format!("encoding: {error}")))?;
@@ -205,6 +211,7 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, me
         times.encode_s = encode_s;
         metrics.done.add(key.workload_number, Operation::EncodeView, 1.0, encode_s);
         metrics.frame_bytes.inc_by(encoded.data.len() as u64);
+        let place = set.place;
         let header =
             encoded.header(key.sample_set_id, place.cell, place.is_neighbour, requested.camera, key.planes, times);
         Output { frame: requested.frame, header, data: encoded.data, arrived, credit }

@@ -5,12 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{
-    CellPlan, NodeConfig, NodeMetrics, PlansInForce, Relay, Scenes, SetMemory, ViewProbes, next_within, until_drained,
-};
+use node::{CellPlan, NodeParts, Relay, ViewProbes, next_within, until_drained};
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
-use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Compositor, Messages};
 
@@ -28,7 +25,6 @@ use crate::view_times::ViewTimes;
 /// The compositor's role.
 pub struct CompositorService {
     shared: Arc<Shared>,
-    shutdown: CancellationToken,
     /// Ends with the service.
     _rendering: JoinSet<()>,
 }
@@ -36,48 +32,21 @@ pub struct CompositorService {
 impl CompositorService {
     /// Starts the device's loops, which end with the service.
     #[must_use]
-    pub fn new(
-        scenes: Arc<Scenes>,
-        plans: PlansInForce,
-        config: &NodeConfig,
-        metrics: NodeMetrics,
-        probes: Arc<dyn ViewProbes>,
-        shutdown: CancellationToken,
-    ) -> Self {
+    pub fn new(node: Arc<NodeParts>, probes: Arc<dyn ViewProbes>) -> Self {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
-        let times = Arc::new(ViewTimes::new(config.max_view_s));
-        let auditor = Auditor {
-            scenes: scenes.clone(),
-            probes,
-            plans: plans.clone(),
-            metrics: metrics.clone(),
-            direct_share: config.direct_share,
-            choice: Mutex::default(),
-        };
+        let times = Arc::new(ViewTimes::new(node.config.max_view_s));
+        let auditor = Auditor { node: node.clone(), probes, choice: Mutex::default() };
         let renderer = Rendering::new(Arc::new(auditor), times.clone());
         for lane in Lane::ALL {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
-        let sets = Arc::new(Sets::new(scenes.clone(), plans.clone(), config, metrics.clone()));
-        let quota = NodeQuota::new(config.quotas);
-        let shared = Shared {
-            plans,
-            sets,
-            arrivals,
-            quota,
-            times,
-            deadlines: config.deadlines,
-            metrics,
-            stream_count: AtomicU64::new(1),
-        };
-        Self { shared: Arc::new(shared), shutdown, _rendering: rendering }
-    }
-
-    /// The sets on the device.
-    #[must_use]
-    pub fn memory(&self) -> Arc<dyn SetMemory> {
-        Arc::new(self.shared.sets.cached.clone())
+        let sets = Arc::new(Sets::new(node.clone()));
+        let cached = sets.cached.clone();
+        node.monitor.add_memory(move || cached.free());
+        let quota = NodeQuota::new(node.config.quotas);
+        let shared = Shared { node, sets, arrivals, quota, times, stream_count: AtomicU64::new(1) };
+        Self { shared: Arc::new(shared), _rendering: rendering }
     }
 
     /// Relays the images that this compositor fetches to other compositors.
@@ -93,15 +62,15 @@ impl Compositor for CompositorService {
     async fn render_views(&self, requests: Messages<RenderViews>) -> Result<Messages<FramePart>, Status> {
         let place = self.shared.quota.stream()?;
         let stream = self.shared.stream_count.fetch_add(1, Ordering::Relaxed);
-        let outbox = Outbox::new(stream, self.shared.metrics.clone());
-        self.shared.metrics.streams.inc();
+        let outbox = Outbox::new(stream, self.shared.node.metrics.clone());
+        self.shared.node.metrics.streams.inc();
         let client = ClientStream { shared: self.shared.clone(), stream, outbox: outbox.clone() };
-        let requests = until_drained(requests, self.shutdown.clone());
+        let requests = until_drained(requests, self.shared.node.shutdown.clone());
         tokio::spawn(async move {
             client.run(requests).await;
             drop(place);
         });
-        Ok(until_drained(Box::pin(Outgoing(outbox)), self.shutdown.clone()))
+        Ok(until_drained(Box::pin(Outgoing(outbox)), self.shared.node.shutdown.clone()))
     }
 }
 
@@ -109,7 +78,7 @@ impl ClientStream {
     /// Runs until either side ends the stream; a client that takes no frames is cut off.
     async fn run(self, requests: Messages<RenderViews>) {
         let stream = self.stream;
-        let stall = self.shared.deadlines.stall;
+        let stall = self.shared.node.config.deadlines.stall;
         tokio::select! {
             () = self.answer_and_send(requests) => (),
             () = self.outbox.gone.cancelled() => (),
@@ -134,7 +103,7 @@ impl ClientStream {
     }
 
     async fn answer(&self, mut requests: Messages<RenderViews>, reply: Reply) -> Result<(), Status> {
-        let idle = self.shared.deadlines.idle;
+        let idle = self.shared.node.config.deadlines.idle;
         match next_within(&mut requests, idle, "views").await? {
             None => Ok(()),
             Some(first) if first.live.is_some() => LiveStream::new(self, reply).answer(first, requests).await,

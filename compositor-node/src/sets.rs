@@ -6,10 +6,8 @@ use std::time::{Duration, Instant};
 use cluster::{Assignment, CommonCell, DIRECT, Policy, SceneRef, SetContent, Timeline, Workload};
 use codec::EncodedImage;
 use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
-use node::{
-    ByteCache, CellPlan, CommonSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Scenes, SharedSet, Turn,
-};
-use node::{WorkClass, beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
+use node::{ByteCache, CellPlan, CommonSet, NodeParts, Operation, Pinned, SharedSet, Turn, WorkClass};
+use node::{beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
@@ -76,18 +74,10 @@ fn moment(plan: &Assignment, set_index: u32) -> Option<SetContent> {
     SetContent::of(&workload, set_index)
 }
 
-/// The content of a cell's sets without their time: equal for all moments.
-fn subject(plan: &Assignment) -> Option<SetContent> {
-    let workload = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
-    SetContent::of(&workload, 0)
-}
-
 /// The sets of one compositor: the latest few moments of each cell, as long as memory has room.
 pub(crate) struct Sets {
-    pub(crate) scenes: Arc<Scenes>,
+    node: Arc<NodeParts>,
     fetcher: Arc<Fetcher>,
-    metrics: NodeMetrics,
-    plans: PlansInForce,
     reports: Reports,
     pub(crate) cached: ByteCache<SetContent, ReadySet>,
     relays: RelayBuffers,
@@ -98,7 +88,7 @@ pub(crate) struct Sets {
 impl Sets {
     /// Checks that a plan's samples have the planes that a method needs, where there are samples.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
-        let needed = self.scenes.engine().sample_planes(method)?;
+        let needed = self.node.engine.sample_planes(method)?;
         let is_drawn = plan.policy == Policy::Direct || method == DIRECT;
         if is_drawn || plan.workload.planes.contain(needed) {
             return Ok(());
@@ -107,15 +97,13 @@ impl Sets {
         Err(Status::invalid_argument(format!("reconstruction_method: {method} {text}")))
     }
 
-    pub(crate) fn new(scenes: Arc<Scenes>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
+    pub(crate) fn new(node: Arc<NodeParts>) -> Self {
         Self {
-            scenes,
-            fetcher: Arc::new(Fetcher::new(plans.clone(), config.deadlines)),
-            metrics,
-            plans,
-            reports: Reports::new(config),
+            fetcher: Arc::new(Fetcher::new(node.plans.clone(), node.config.deadlines)),
+            reports: Reports::new(&node.config),
             // The other half is for packed images.
-            cached: ByteCache::new("sample sets", config.set_memory_bytes / 2),
+            cached: ByteCache::new("sample sets", node.config.set_memory_bytes / 2),
+            node,
             relays: RelayBuffers::default(),
             assembling: tokio::sync::Mutex::default(),
         }
@@ -222,7 +210,7 @@ impl Sets {
         }
         let on_device = match sets.is_empty() {
             true => of_cell.set.clone(),
-            false => self.scenes.engine().with_common(of_cell.set.clone(), sets)?,
+            false => self.node.engine.with_common(of_cell.set.clone(), sets)?,
         };
         Ok(Some(ViewSets { of_cell, on_device, _common: in_use }))
     }
@@ -286,18 +274,19 @@ impl Sets {
         }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
         match load().await {
-            Err(status) if status.code() == Code::FailedPrecondition && self.is_in_force(plan) => load().await,
+            Err(status)
+                if status.code() == Code::FailedPrecondition
+                    && self.node.plans.require(plan.workload_number, plan.plan_epoch).is_ok() =>
+            {
+                load().await
+            }
             loaded => loaded,
         }
     }
 
-    fn is_in_force(&self, plan: &CellPlan) -> bool {
-        self.plans.in_force(plan.workload_number).is_some_and(|in_force| in_force.plan_epoch == plan.plan_epoch)
-    }
-
     /// The most bytes of a cell's set, with its images for others.
     fn most_bytes(&self, plan: &CellPlan) -> usize {
-        let relayed = plan.relays(&self.plans.node_name);
+        let relayed = plan.relays(&self.node.plans.node_name);
         let illumination = &plan.workload.illumination;
         let cameras = &*plan.workload.sample_cameras;
         let packed = if relayed { most_image_bytes(illumination, cameras) } else { 0 };
@@ -329,14 +318,15 @@ impl Sets {
         content: SetContent,
     ) -> Result<(ReadySet, usize), Status> {
         let start = Instant::now();
-        let relay = plan.relays(&self.plans.node_name).then(|| self.relays.of(content));
+        let relay = plan.relays(&self.node.plans.node_name).then(|| self.relays.of(content));
         let relay = relay.filter(|relay| !relay.has_failed());
         let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
         let (set, times) = self.fetcher.fetch(&request).await.map_err(|failed| {
             self.reports.report(plan.plan_epoch, &failed);
             failed.status
         })?;
-        let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
+        let still = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
+        let subject = SetContent::of(&still, 0).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
         let compared = if compares_images(plan) { set.images.depth() } else { &[] };
@@ -345,15 +335,15 @@ impl Sets {
             set_bytes(&set.images) + depth_images_bytes(compared) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
-        let uploading = self.scenes.on_device(&plan.workload.scene, move |engine| {
+        let uploading = self.node.on_device(&plan.workload.scene, move |engine| {
             let (set, upload_s) = own_time(engine, || engine.upload(&set, Turn::of(WorkClass::Batch)));
             Ok((set?, upload_s))
         });
         let (set, upload_s) = uploading.await?;
-        self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
-        self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
-        self.metrics.sets_loaded.inc();
-        self.metrics.set_s.observe(start.elapsed().as_secs_f64());
+        self.node.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
+        self.node.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
+        self.node.metrics.sets_loaded.inc();
+        self.node.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).filter(|_| !plan.is_common);
         let cameras = SampleCamera::references(&plan.workload.sample_cameras);

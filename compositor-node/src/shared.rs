@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use cluster::{Assignment, DIRECT, Policy, RenderViews};
 use depth_image::PinholeCamera;
-use node::{CellPlan, Deadlines, NodeMetrics, Pinned, PlansInForce, beyond_timeline};
+use node::{CellPlan, NodeParts, Pinned, beyond_timeline};
 use tonic::Status;
 
 use crate::batch::{BatchKey, Loaded, Place, Source, Waiting};
@@ -26,13 +26,11 @@ const LONG_PIXELS: u32 = 1 << 20;
 
 /// The parts that all streams share.
 pub(crate) struct Shared {
-    pub(crate) plans: PlansInForce,
+    pub(crate) node: Arc<NodeParts>,
     pub(crate) sets: Arc<Sets>,
     pub(crate) arrivals: Arc<Arrivals>,
     pub(crate) quota: NodeQuota,
     pub(crate) times: Arc<ViewTimes>,
-    pub(crate) deadlines: Deadlines,
-    pub(crate) metrics: NodeMetrics,
     pub(crate) stream_count: AtomicU64,
 }
 
@@ -62,7 +60,7 @@ impl ClientStream {
 /// However a call ends, nothing of it is left.
 impl Drop for ClientStream {
     fn drop(&mut self) {
-        let metrics = &self.shared.metrics;
+        let metrics = &self.shared.node.metrics;
         self.shared.arrivals.withdraw(self.stream).iter().for_each(|_| metrics.drop_view("client gone"));
         metrics.done.viewer_left(self.stream);
         metrics.streams.dec();
@@ -75,7 +73,7 @@ impl Shared {
             return Lane::Preview;
         }
         if key.method == DIRECT
-            && self.plans.in_force(key.workload_number).is_some_and(|plan| plan.policy != Policy::Direct)
+            && self.node.plans.in_force(key.workload_number).is_some_and(|plan| plan.policy != Policy::Direct)
         {
             return Lane::Direct;
         }
@@ -107,7 +105,7 @@ impl Shared {
     /// The plan for views by a method, if this node makes views in it. Views that are drawn from the scene ignore the plan's
     /// policy.
     pub(crate) fn of_compositor(&self, plan: Arc<Assignment>, method: &str) -> Result<Arc<Assignment>, Status> {
-        let name = &self.plans.node_name;
+        let name = &self.node.plans.node_name;
         if !plan.composites(name) {
             let plan_epoch = plan.plan_epoch;
             return Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")));

@@ -7,76 +7,42 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use cluster::{ClusterStatus, ErrorInterval, PromiseState};
-use node::Telemetry;
 use parking_lot::Mutex;
 use prometheus_client::metrics::{counter::Counter, family::Family, gauge::Gauge};
-use prometheus_client::registry::{Metric, Registry, Unit};
+use prometheus_client::registry::Unit;
 
 use crate::schedule::{Command, Event, Recorder};
 
 /// A gauge for each value of its labels: names and values.
 type Gauges<const LABELS: usize> = Family<[(&'static str, String); LABELS], Gauge<f64, AtomicU64>>;
 
-/// A gauge: its name, its help, and its count in a status of the cluster.
-type CountGauge = (&'static str, &'static str, fn(&ClusterStatus) -> u64);
-
-const COUNTS: [CountGauge; 6] = [
-    ("cluster_nodes", "P: nodes that have joined", |status| status.nodes.len() as u64),
-    ("cluster_workloads", "Workloads that are open", |status| status.workloads.len() as u64),
-    ("cluster_samplers", "K: nodes that sample, of all workloads", |status| status.sampler_count() as u64),
-    ("cluster_sessions", "Sessions of all workloads", ClusterStatus::session_count),
-    ("cluster_views_per_set", "V: views of a sample set, of all workloads", ClusterStatus::views_per_set),
-    ("cluster_plan_epoch", "The last plan", |status| status.plan_epoch),
-];
-
-/// Registered gauges of the cluster's state, and counters of plans and measurements.
-#[derive(Debug, Clone)]
-pub struct CoordinatorMetrics {
-    counts: [Gauge; COUNTS.len()],
-    plans: Counter,
-    promises: Family<[(&'static str, String); 1], Gauge>,
-    view_probes: Counter,
-    /// The bounds of each workload's audited error, and its mean.
-    audit_errors: Gauges<2>,
-    known_light: Gauges<1>,
-    /// The parts of a view of each workload whose views take their light from samples.
-    view_parts_s: Gauges<2>,
-    broken: Counter,
-    /// Workloads whose promise is broken now.
-    broken_workloads: Arc<Mutex<BTreeSet<u64>>>,
+node::metrics! {
+    /// Registered gauges of the cluster's state, and counters of plans and measurements.
+    pub struct CoordinatorMetrics {
+        nodes: Gauge, "cluster_nodes", "P: nodes that have joined";
+        workloads: Gauge, "cluster_workloads", "Workloads that are open";
+        samplers: Gauge, "cluster_samplers", "K: nodes that sample, of all workloads";
+        sessions: Gauge, "cluster_sessions", "Sessions of all workloads";
+        views_per_set: Gauge, "cluster_views_per_set", "V: views of a sample set, of all workloads";
+        plan_epoch: Gauge, "cluster_plan_epoch", "The last plan";
+        plans: Counter, "cluster_plans", "Plans made";
+        promises: Family<[(&'static str, String); 1], Gauge>, "cluster_promises",
+            "Promises to the sessions of a workload";
+        view_probes: Counter, "cluster_view_probes", "Measurements for budgets";
+        audit_errors: Gauges<2>, "cluster_audit_error_ratio",
+            "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean";
+        known_light: Gauges<1>, "cluster_known_light_ratio",
+            "The share of a view's surface points whose light samples know, as measured";
+        view_parts_s: Gauges<2>, "cluster_view_part" in Seconds,
+            "Parts of a view whose light comes from samples, as measured";
+        broken: Counter, "cluster_promises_broken", "Promises that audits have found broken";
+    } beside {
+        /// Workloads whose promise is broken now.
+        broken_workloads: Arc<Mutex<BTreeSet<u64>>>
+    }
 }
 
 impl CoordinatorMetrics {
-    /// Registered, all at zero.
-    #[must_use]
-    pub fn new(telemetry: &Telemetry) -> Self {
-        let registry = &mut *telemetry.registry();
-        Self {
-            counts: COUNTS.map(|(name, help, _)| registered(registry, name, help)),
-            plans: registered(registry, "cluster_plans", "Plans made"),
-            promises: registered(registry, "cluster_promises", "Promises to the sessions of a workload"),
-            view_probes: registered(registry, "cluster_view_probes", "Measurements for budgets"),
-            audit_errors: registered(
-                registry,
-                "cluster_audit_error_ratio",
-                "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean",
-            ),
-            known_light: registered(
-                registry,
-                "cluster_known_light_ratio",
-                "The share of a view's surface points whose light samples know, as measured",
-            ),
-            view_parts_s: {
-                let parts_s = Gauges::default();
-                let help = "Parts of a view whose light comes from samples, as measured";
-                registry.register_with_unit("cluster_view_part", help, Unit::Seconds, parts_s.clone());
-                parts_s
-            },
-            broken: registered(registry, "cluster_promises_broken", "Promises that audits have found broken"),
-            broken_workloads: Arc::default(),
-        }
-    }
-
     /// Shows the cluster's state, and counts what the schedule has ordered.
     pub fn show(&self, status: &ClusterStatus, commands: &[Command]) {
         let plans = commands.iter().filter(|command| matches!(command, Command::Apply { .. })).count();
@@ -90,8 +56,15 @@ impl CoordinatorMetrics {
             let count = promises.filter(|promise| promise.state == state).count();
             self.promises.get_or_create(&[("state", state.to_string())]).set(count as i64);
         }
-        for (gauge, (_, _, count)) in self.counts.iter().zip(COUNTS) {
-            gauge.set(i64::try_from(count(status)).unwrap_or(i64::MAX));
+        for (gauge, count) in [
+            (&self.nodes, status.nodes.len() as u64),
+            (&self.workloads, status.workloads.len() as u64),
+            (&self.samplers, status.sampler_count() as u64),
+            (&self.sessions, status.session_count()),
+            (&self.views_per_set, status.views_per_set()),
+            (&self.plan_epoch, status.plan_epoch),
+        ] {
+            gauge.set(i64::try_from(count).unwrap_or(i64::MAX));
         }
     }
 
@@ -105,8 +78,8 @@ impl CoordinatorMetrics {
         self.audit_errors.clear();
         for workload in &status.workloads {
             let audit = workload.promise.as_ref().and_then(|promise| promise.audit);
-            let Some(ErrorInterval { least, mean, greatest }) = audit.and_then(|audit| audit.error) else { continue };
-            for (value, ratio) in [("low", least), ("mean", mean), ("high", greatest)] {
+            let Some(ErrorInterval { low, mean, high }) = audit.and_then(|audit| audit.error) else { continue };
+            for (value, ratio) in [("low", low), ("mean", mean), ("high", high)] {
                 let labels = [("workload", workload.number.to_string()), ("value", value.to_owned())];
                 self.audit_errors.get_or_create(&labels).set(ratio);
             }
@@ -128,18 +101,6 @@ impl CoordinatorMetrics {
                     .set(seconds);
             }
         }
-    }
-}
-
-fn registered<M: Metric + Clone + Default>(registry: &mut Registry, name: &str, help: &str) -> M {
-    let metric = M::default();
-    registry.register(name, help, metric.clone());
-    metric
-}
-
-impl Default for CoordinatorMetrics {
-    fn default() -> Self {
-        Self::new(&Telemetry::default())
     }
 }
 
@@ -168,6 +129,7 @@ impl Observers {
 #[cfg(test)]
 mod tests {
     use cluster::{SharedLightCosts, WorkloadStatus};
+    use node::Telemetry;
 
     use super::*;
 

@@ -15,7 +15,7 @@ use wire::rpc::NodeClient;
 
 use crate::grpc_status::{of_node, within};
 use crate::measuring::known_or_measured;
-use crate::schedule::{Event, ViewProbe, view_errors};
+use crate::schedule::{Event, ViewProbe};
 use crate::shared::Shared;
 
 /// How long a node may measure, waits for other work included.
@@ -116,7 +116,7 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Statu
     let (Some((row, _)), Some([answer])) = (requests.first(), answers.first().map(Vec::as_slice)) else {
         return Err(Status::out_of_range("a comparison is of one row"));
     };
-    let views = views.into_iter().zip(answer.views.iter().map(view_errors)).collect();
+    let views = views.into_iter().zip(answer.views.iter().copied()).collect();
     let probed = Probed { id, row: *row, views, costs: row_costs(answer), busy_s };
     Ok(check(id, PlannerEvent::Probed(probed)))
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeService, OpenEngine, PlansInForce, Scenes,
-    ServeError, health, keep_membership,
+    Engine, EngineError, NodeConfig, NodeMetrics, NodeParts, NodeService, OpenEngine, ServeError, health,
+    keep_membership,
 };
 use probe::Probers;
 use sampler_node::SamplerService;
@@ -94,52 +94,27 @@ async fn serve_on(
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<Option<String>, ServeError> {
-    let monitor = DeviceMonitor::new(engine);
-    let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
-    let plans = PlansInForce::new(&config.node_name);
-    let scenes = Arc::new(Scenes::new(engine.clone(), config));
+    let node = NodeParts::new(engine, config, metrics, shutdown.clone());
     let address = listener.local_addr()?;
-    let left = plans.clone();
     let status = NodeStatus {
         node_name: config.node_name.clone(),
         address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
-        device_name: engine.device_name(),
-        is_software: engine.is_software(),
+        device_name: node.engine.device_name(),
+        is_software: node.engine.is_software(),
     };
-    let probers = Arc::new(Probers::new(engine.clone()));
-    let compositor = CompositorService::new(
-        scenes.clone(),
-        plans.clone(),
-        config,
-        metrics.clone(),
-        probers.clone(),
-        shutdown.clone(),
-    );
-    let relay = compositor.relay();
-    let done = metrics.done.clone();
-    let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
-    monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
-    let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics, probers);
+    let probers = Arc::new(Probers::new(node.engine.clone()));
+    let compositor = CompositorService::new(node.clone(), probers.clone());
+    let sampler = SamplerService::new(node.clone(), compositor.relay());
+    let service = NodeService::new(node.clone(), probers);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let coordinator = config.coordinator.clone();
-    let away = config.deadlines.away;
-    let ends = shutdown.clone();
-    let membership = tokio::spawn(stay_while_memory_lasts(
-        move || {
-            let plans = plans.clone();
-            keep_membership(status.clone(), coordinator.clone(), plans, scenes.clone(), done.clone(), ends.clone())
-        },
-        monitor.clone(),
-        left,
-        away,
-    ));
+    let membership = tokio::spawn(stay_while_memory_lasts(node.clone(), status));
     let mut serving = pin!(node::serve(listener, routes, config.insecure_bind, shutdown.clone()));
     let served = tokio::select! {
         served = &mut serving => served.map(|()| None),
-        reason = monitor.lost() => {
+        reason = node.monitor.lost() => {
             shutdown.cancel();
             serving.await.map(|()| Some(reason))
         }
@@ -150,24 +125,20 @@ async fn serve_on(
 }
 
 /// A member leaves when its device has no memory left, and begins again without plans and sets.
-async fn stay_while_memory_lasts<F: Future<Output = ()>>(
-    member: impl Fn() -> F,
-    monitor: DeviceMonitor,
-    plans: PlansInForce,
-    away: Duration,
-) {
+async fn stay_while_memory_lasts(node: Arc<NodeParts>, status: NodeStatus) {
+    let away = node.config.deadlines.away;
     loop {
         tokio::select! {
-            () = member() => return,
-            () = monitor.exhausted() => (),
+            () = keep_membership(node.clone(), status.clone()) => return,
+            () = node.monitor.exhausted() => (),
         }
         tracing::error!(
-            node = &*plans.node_name,
+            node = &*node.plans.node_name,
             away_s = away.as_secs_f64(),
             "out of device memory: leaves for a while"
         );
-        plans.forget_all();
+        node.plans.forget_all();
         tokio::time::sleep(away).await;
-        monitor.begin_anew();
+        node.monitor.begin_anew();
     }
 }

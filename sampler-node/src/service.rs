@@ -8,15 +8,13 @@ use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedImage, SampleSetId, encode_sample_image, split_into_chunks};
 use depth_image::SampleImage;
 use node::{
-    ByteCache, CellPlan, Engine, EngineError, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay,
-    SampleWork, Scenes, SetMemory, Turn,
+    ByteCache, CellPlan, Engine, EngineError, NodeMetrics, NodeParts, Operation, Pinned, Relay, SampleWork, Turn,
 };
 use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, own_time, until_drained, with_guard};
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
-use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Messages, Sampler};
 
@@ -46,38 +44,21 @@ impl Turns {
 
 /// The sampler's role.
 pub struct SamplerService {
-    scenes: Arc<Scenes>,
-    plans: PlansInForce,
+    node: Arc<NodeParts>,
     cache: ByteCache<Key, PackedImages>,
-    /// A receiver that takes no chunk for so long is cut off: it keeps images in memory.
-    stall: Duration,
     turns: Turns,
     relay: Relay,
-    metrics: NodeMetrics,
-    shutdown: CancellationToken,
 }
 
 impl SamplerService {
     /// The service of a node, which relays the images of `relay`.
     #[must_use]
-    pub fn new(
-        scenes: Arc<Scenes>,
-        plans: PlansInForce,
-        config: &NodeConfig,
-        relay: Relay,
-        metrics: NodeMetrics,
-        shutdown: CancellationToken,
-    ) -> Self {
+    pub fn new(node: Arc<NodeParts>, relay: Relay) -> Self {
         // The other half is for sets on the device.
-        let cache = ByteCache::new("packed sample images", config.set_memory_bytes / 2);
-        let stall = config.deadlines.stall;
-        Self { scenes, plans, cache, stall, turns: Turns::default(), relay, metrics, shutdown }
-    }
-
-    /// The packed images.
-    #[must_use]
-    pub fn memory(&self) -> Arc<dyn SetMemory> {
-        Arc::new(self.cache.clone())
+        let cache = ByteCache::new("packed sample images", node.config.set_memory_bytes / 2);
+        let cached = cache.clone();
+        node.monitor.add_memory(move || cached.free());
+        Self { node, cache, turns: Turns::default(), relay }
     }
 
     /// All of this node's images of a set, made for the first request in one submission.
@@ -87,26 +68,24 @@ impl SamplerService {
         set_index: u32,
     ) -> Result<impl Future<Output = Result<Pinned<PackedImages>, Status>> + Send + 'static, Status> {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
-        let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
+        let indices = plan.images_of(&self.node.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
-        let scenes = self.scenes.clone();
+        let node = self.node.clone();
         let scene = plan.workload.scene.clone();
-        let metrics = self.metrics.clone();
         let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
         let most_bytes = most_image_bytes(&plan.workload.illumination, &own);
         let key = (content, plan.tile_count, indices);
         let tiles = f64::from(plan.tile_count);
         let number = plan.workload_number;
         let turn = self.turns.of(number);
-        let plans = self.plans.clone();
         let make = async move {
             let _one = turn.lock().await;
             // A later plan may be in force by now: its sets must not wait for sets that no plan has any more.
-            if !plans.have_set(&content, set_index) {
+            if !node.plans.have_set(&content, set_index) {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
-            let sampled = scenes.on_device(&scene, move |engine| sample(engine, &work)).await?;
-            let images = blocking(move || pack(&sampled, tiles, number, &metrics)).await?;
+            let sampled = node.on_device(&scene, move |engine| sample(engine, &work)).await?;
+            let images = blocking(move || pack(&sampled, tiles, number, &node.metrics)).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))
         };
@@ -125,7 +104,8 @@ impl SamplerService {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
         let wanted = request.image_indices;
-        let stall = self.stall;
+        // A receiver that takes no chunk for so long is cut off: it keeps images in memory.
+        let stall = self.node.config.deadlines.stall;
         tokio::spawn(async move {
             let send_all = async {
                 match images.await {
@@ -138,15 +118,16 @@ impl SamplerService {
                 () = send.closed() => (),
             }
         });
-        until_drained(Box::pin(ReceiverStream::new(chunks)), self.shutdown.clone())
+        until_drained(Box::pin(ReceiverStream::new(chunks)), self.node.shutdown.clone())
     }
 }
 
 #[async_trait]
 impl Sampler for SamplerService {
     async fn fetch_sample_images(&self, request: FetchImages) -> Result<Messages<Chunk>, Status> {
-        let plan = CellPlan::of(&self.plans.remembered(request.workload_number, request.plan_epoch)?, request.cell)?;
-        let name = &self.plans.node_name;
+        let plan =
+            CellPlan::of(&self.node.plans.remembered(request.workload_number, request.plan_epoch)?, request.cell)?;
+        let name = &self.node.plans.node_name;
         let own = plan.images_of(name, request.set_index);
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             if plan.relays(name) {

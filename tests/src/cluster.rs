@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{
-    Assignment, BudgetRequest, CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline,
+    ApplyPlan, Assignment, BudgetRequest, CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash,
+    SessionRequest, Timeline,
 };
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, OfferedCube, OfferedMirror, SceneOffer, SceneOffers};
@@ -446,4 +447,10 @@ pub async fn connected(address: &str) -> Client {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     panic!("no coordinator at {address}");
+}
+
+/// A plan that does not tell which workloads are open.
+#[must_use]
+pub fn plan_alone(assignment: Assignment) -> ApplyPlan {
+    ApplyPlan { assignment, open_workloads: Vec::new() }
 }

@@ -1,6 +1,6 @@
 //! Audits in the schedule: promises that views in force do not keep, and what replaces them.
 
-use cluster::{AuditReport, AuditedView, Policy, PolicyChoice, ProbedView, Promise, PromiseState};
+use cluster::{AuditReport, AuditedView, Policy, PolicyChoice, Promise, PromiseState, ViewErrors};
 use depth_image::PinholeCamera;
 use glam::Vec3;
 
@@ -33,7 +33,7 @@ fn at(place: usize) -> PinholeCamera {
 }
 
 fn audited(cluster: &Cluster, place: usize, flip: f64) -> AuditedView {
-    let errors = ProbedView {
+    let errors = ViewErrors {
         foreground_ratio: 0.5,
         flip,
         flip_whole: flip / 2.0,
@@ -89,7 +89,7 @@ fn views_are_audited_where_something_is_promised_for_them() {
         (PromiseState::Kept, true, true)
     );
     let error = summary.error.unwrap();
-    assert!(error.least <= 0.04 && (error.mean - 0.04).abs() < 1e-9 && error.greatest >= 0.04, "{error:?}");
+    assert!(error.low <= 0.04 && (error.mean - 0.04).abs() < 1e-9 && error.high >= 0.04, "{error:?}");
     assert!(
         promise.reason.contains("Audits: flip 0.0400 (") && promise.reason.contains("Not covered: 9 %"),
         "{promise}"

@@ -70,6 +70,5 @@ pub use load::Load;
 pub use node_costs::NodeCosts;
 pub use prediction::pipeline_s;
 pub use prices::{EqualNodes, STILL_SET_S};
-pub(crate) use promise_audit::view_errors;
 pub use scheduler::Scheduler;
 pub use search::Division;

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use cluster::{AuditReport, AuditSummary, AuditedView, ErrorInterval, ProbedView};
-use planner::{Audit, Budget, Certificate, ErrorTerm, Interval, Metric, Statistic, ViewErrors};
+use cluster::{AuditReport, AuditSummary, AuditedView};
+use planner::{Audit, Budget, Certificate, ErrorTerm, Interval, Metric, Statistic};
 
 /// A rate is not known before.
 const RATE_AFTER: Duration = Duration::from_secs(60);
@@ -67,7 +67,7 @@ impl PromiseAudit {
                 self.parts += 1;
                 self.parts_foreground += view.errors.foreground_ratio;
             }
-            self.audit.observe(&view_errors(&view.errors));
+            self.audit.observe(&view.errors);
             count += 1;
         }
         if count > 0 {
@@ -84,7 +84,7 @@ impl PromiseAudit {
         if view.is_part {
             return None;
         }
-        let errors = view_errors(&view.errors);
+        let errors = &view.errors;
         let ratio = errors.error_ratio(self.term.metric());
         let is_above = errors.foreground_ratio >= LEAST_FOREGROUND && ratio > self.term.most_ratio();
         (errors.counts_for(&self.term) && is_above).then_some(ratio)
@@ -96,14 +96,13 @@ impl PromiseAudit {
     }
 
     pub(super) fn summary(&self, now: Duration) -> AuditSummary {
-        let error = self.audit.error_interval();
         AuditSummary {
             audited_views: self.audit.views()[0],
             covered_views: self.covered_views,
             uncovered_views: self.uncovered_views,
             audits_per_s: self.audits_per_h(now) / HOUR_S,
             busy_s: self.busy_s,
-            error: error.map(|Interval { low, mean, high }| ErrorInterval { least: low, mean, greatest: high }),
+            error: self.audit.error_interval(),
             viewers_above: 0,
         }
     }
@@ -184,10 +183,4 @@ fn duration(seconds: f64) -> String {
         s if s < 1000.0 * HOUR_S => format!("{:.0} h", s / HOUR_S),
         _ => "months".to_owned(),
     }
-}
-
-/// Errors as planners have them.
-pub(crate) fn view_errors(view: &ProbedView) -> ViewErrors {
-    let ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *view;
-    ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
 }

@@ -82,13 +82,6 @@ impl ApplyPlan {
     }
 }
 
-impl From<Assignment> for ApplyPlan {
-    /// A plan that does not tell which workloads are open.
-    fn from(assignment: Assignment) -> Self {
-        Self { assignment, open_workloads: Vec::new() }
-    }
-}
-
 impl Assignment {
     /// The cameras of all images that are sampled: of the set's images, or of their tiles.
     #[must_use]

@@ -1,6 +1,7 @@
 //! Audits of promises: compositors draw some of the views that they make directly as well, and compare them.
 
 use depth_image::{Antialias, PinholeCamera};
+use planner::{Interval, ViewErrors};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, finite_seconds, within};
@@ -57,20 +58,9 @@ pub struct AuditedView {
     /// Its camera.
     pub camera: PinholeCamera,
     /// Its errors.
-    pub errors: ProbedView,
+    pub errors: ViewErrors,
     /// They are those of a part of it, which was chosen at random.
     pub is_part: bool,
-}
-
-/// Errors of a view, each from 0 to 1, as nodes measure them for budgets and audits; see `planner::ViewErrors`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "as there")]
-pub struct ProbedView {
-    pub foreground_ratio: f64,
-    pub flip: f64,
-    pub flip_whole: f64,
-    pub mean_square: f64,
-    pub disoccluded_ratio: f64,
 }
 
 /// The findings of the audits of a promise.
@@ -86,19 +76,10 @@ pub struct AuditSummary {
     pub audits_per_s: f64,
     /// The nodes' time for drawing and comparing, in s.
     pub busy_s: f64,
-    /// `None` for too few views.
-    pub error: Option<ErrorInterval>,
+    /// The interval of the error as a ratio, however often it is looked at; `None` for too few views.
+    pub error: Option<Interval>,
     /// Viewers that stay where the error is above the budget.
     pub viewers_above: u32,
-}
-
-/// An error as a ratio. It lies in the interval with 95 % confidence, however often that is looked at.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub struct ErrorInterval {
-    pub least: f64,
-    pub mean: f64,
-    pub greatest: f64,
 }
 
 /// Whether two cameras are at one place, as far as audits are concerned: nearer than `least_apart_m`, in about one direction.
@@ -120,30 +101,23 @@ impl AuditOrder {
     }
 }
 
-impl ProbedView {
-    pub(crate) fn validate(&self) -> Result<(), InvalidField> {
-        within(self.foreground_ratio, 0.0..=1.0, "foreground_ratio", "from 0 to 1")?;
-        within(self.flip, 0.0..=1.0, "flip_ratio", "from 0 to 1")?;
-        within(self.flip_whole, 0.0..=1.0, "flip_whole_ratio", "from 0 to 1")?;
-        within(self.mean_square, 0.0..=1.0, "mean_square_ratio", "from 0 to 1")?;
-        within(self.disoccluded_ratio, 0.0..=1.0, "disoccluded_ratio", "from 0 to 1")
-    }
+/// Errors of a view are from 0 to 1.
+pub(crate) fn check_view_errors(errors: &ViewErrors) -> Result<(), InvalidField> {
+    within(errors.foreground_ratio, 0.0..=1.0, "foreground_ratio", "from 0 to 1")?;
+    within(errors.flip, 0.0..=1.0, "flip_ratio", "from 0 to 1")?;
+    within(errors.flip_whole, 0.0..=1.0, "flip_whole_ratio", "from 0 to 1")?;
+    within(errors.mean_square, 0.0..=1.0, "mean_square_ratio", "from 0 to 1")?;
+    within(errors.disoccluded_ratio, 0.0..=1.0, "disoccluded_ratio", "from 0 to 1")
 }
 
 impl AuditReport {
-    /// Whether there is nothing to report.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.views.is_empty() && self.covered_views == 0 && self.uncovered_views == 0
-    }
-
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
         at_most(self.views.len(), MAX_PROBE_VIEWS, "audit.views")?;
         for AuditedView { camera, errors, .. } in &self.views {
             camera.validate().map_err(|source| InvalidField::Camera { field: "audit.views", source })?;
-            errors.validate()?;
+            check_view_errors(errors)?;
         }
         within(self.busy_s, 0.0..=MAX_BUSY_S, "audit.busy_s", "from 0 to 1e6")
     }
@@ -161,7 +135,7 @@ impl AuditSummary {
     pub fn validate(&self) -> Result<(), InvalidField> {
         finite_seconds(self.audits_per_s, "audit.audits_per_s")?;
         finite_seconds(self.busy_s, "audit.busy_s")?;
-        let Some(ErrorInterval { least, mean, greatest }) = self.error else { return Ok(()) };
-        [least, mean, greatest].into_iter().try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
+        let Some(Interval { low, mean, high }) = self.error else { return Ok(()) };
+        [low, mean, high].into_iter().try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
     }
 }

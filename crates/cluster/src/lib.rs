@@ -28,23 +28,24 @@ mod test_support;
 
 pub use assignment::{ApplyPlan, Assignment, CompositorShare, SamplerShare};
 pub use audit::{
-    AuditOrder, AuditReport, AuditSummary, AuditedView, ErrorInterval, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS,
-    ProbedView, is_one_place,
+    AuditOrder, AuditReport, AuditSummary, AuditedView, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS, is_one_place,
 };
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };
 pub use common_cell::{CommonCell, CommonKind};
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts, TimedSize};
+pub use depth_image::Refinement;
 pub use node::{
     BudgetMeasurement, JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, SharedLightCosts,
     Welcome, WorkReport,
 };
+pub use planner::{Interval as ErrorInterval, ViewErrors};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
 pub use promise::{BudgetRequest, Promise, PromiseState};
-pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
+pub use scene::{FetchScene, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};
-pub use timeline::{Refinement, Timeline};
+pub use timeline::Timeline;
 pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count, check_view_size};
 pub use workload::{SamplePlanes, SetContent, Workload, has_indirect_light};

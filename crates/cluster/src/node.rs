@@ -1,9 +1,10 @@
 //! Members: joining, measuring, being ready for plans, and reports on their own work and on each other.
 
 use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
+use planner::ViewErrors;
 use serde::{Deserialize, Serialize};
 
-use crate::audit::{AuditReport, ProbedView};
+use crate::audit::{AuditReport, check_view_errors};
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
 use crate::check_seconds;
 use crate::costs::{Costs, MeasuredCosts};
@@ -125,7 +126,7 @@ pub struct Measured {
     /// The parts of a view whose light comes from samples; `None` by another method.
     pub shared_light: Option<SharedLightCosts>,
     /// The errors of the typical views, where they were compared, in their order.
-    pub views: Vec<ProbedView>,
+    pub views: Vec<ViewErrors>,
     /// The node's time for a budget's measurement, in s.
     pub busy_s: f64,
 }
@@ -135,7 +136,7 @@ impl Measured {
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.costs.validate()?;
-        self.views.iter().try_for_each(ProbedView::validate)?;
+        self.views.iter().try_for_each(check_view_errors)?;
         finite_seconds(self.busy_s, "busy_s")
     }
 }
@@ -180,14 +181,6 @@ pub struct Ready {
     pub plan_epoch: u64,
     /// Time to load the scene; 0 where it was loaded already.
     pub scene_load_s: f64,
-}
-
-impl Ready {
-    /// # Errors
-    /// For a time that is negative or not finite.
-    pub fn validate(&self) -> Result<(), InvalidField> {
-        finite_seconds(self.scene_load_s, "scene_load_s")
-    }
 }
 
 /// The work of a member since its last report.

@@ -68,7 +68,9 @@ impl std::fmt::Display for Promise {
         let Self { budget, state, representation, reason, .. } = self;
         let remark = match state {
             PromiseState::Measuring => format!(", now {representation}"),
-            PromiseState::Kept if self.is_barely_watched() => " (barely watched)".to_owned(),
+            PromiseState::Kept if self.audit.is_some_and(|audit| audit.audits_per_s < BARELY_PER_S) => {
+                " (barely watched)".to_owned()
+            }
             PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => String::new(),
         };
         write!(f, "promise {budget}: {state}{remark}: {reason}")
@@ -85,11 +87,5 @@ impl Promise {
         within(self.bound_ratio, 0.0..=1.0, "promise.bound_ratio", "from 0 to 1")?;
         self.audit.as_ref().map_or(Ok(()), AuditSummary::validate)?;
         reason(&self.reason, "promise.reason")
-    }
-
-    /// Whether audits are too few to find much.
-    #[must_use]
-    pub fn is_barely_watched(&self) -> bool {
-        self.audit.is_some_and(|audit| audit.audits_per_s < BARELY_PER_S)
     }
 }

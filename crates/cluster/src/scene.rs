@@ -89,75 +89,9 @@ pub struct ScenePart {
     pub data: Bytes,
 }
 
-/// Why the parts of a scene make no package.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum SceneAssemblyError {
-    #[error("offset_bytes is {offset_bytes}, must be {expected}: where the part before ended")]
-    Offset { offset_bytes: u64, expected: u64 },
-    #[error("data has {count}, at most {limit} are allowed")]
-    TooLong { count: u64, limit: u64 },
-    #[error("scene is truncated: {count} of {expected} bytes were received")]
-    Truncated { count: u64, expected: u64 },
-    #[error("scene is corrupt: the bytes do not have the hash")]
-    Hash,
-}
-
-/// Puts a package together and checks it against its hash.
-#[derive(Debug)]
-pub struct SceneAssembly {
-    scene: SceneRef,
-    package: Vec<u8>,
-}
-
-impl SceneAssembly {
-    /// An empty package. No more is allocated than has been received.
-    #[must_use]
-    pub fn new(scene: SceneRef) -> Self {
-        Self { scene, package: Vec::new() }
-    }
-
-    /// Adds the next part.
-    ///
-    /// # Errors
-    /// For a part out of order or beyond the announced size.
-    pub fn push(&mut self, part: &ScenePart) -> Result<(), SceneAssemblyError> {
-        let have = self.package.len() as u64;
-        if part.offset_bytes != have {
-            return Err(SceneAssemblyError::Offset { offset_bytes: part.offset_bytes, expected: have });
-        }
-        let count = have + part.data.len() as u64;
-        if count > self.scene.package_bytes {
-            return Err(SceneAssemblyError::TooLong { count, limit: self.scene.package_bytes });
-        }
-        self.package.extend_from_slice(&part.data);
-        Ok(())
-    }
-
-    /// The whole package.
-    ///
-    /// # Errors
-    /// Where it is truncated or is not what its hash says.
-    pub fn finish(self) -> Result<Vec<u8>, SceneAssemblyError> {
-        let have = self.package.len() as u64;
-        let want = self.scene.package_bytes;
-        if have != want {
-            return Err(SceneAssemblyError::Truncated { count: have, expected: want });
-        }
-        if SceneHash::of(&self.package) != self.scene.hash {
-            return Err(SceneAssemblyError::Hash);
-        }
-        Ok(self.package)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn part(offset_bytes: u64, data: &'static [u8]) -> ScenePart {
-        ScenePart { offset_bytes, data: Bytes::from_static(data) }
-    }
 
     #[test]
     fn names_that_are_no_hash_are_refused() {
@@ -168,22 +102,5 @@ mod tests {
         {
             assert!(SceneHash::try_from(bad.to_owned()).expect_err(bad).to_string().contains("scene_hash"));
         }
-    }
-
-    #[test]
-    fn packages_are_whole_and_in_order() {
-        let scene = SceneRef { hash: SceneHash::of(b"abcdef"), package_bytes: 6 };
-        let mut whole = SceneAssembly::new(scene.clone());
-        whole.push(&part(0, b"abc")).unwrap();
-        assert!(whole.push(&part(0, b"abc")).is_err(), "twice");
-        assert!(whole.push(&part(3, b"defg")).is_err(), "too long");
-        whole.push(&part(3, b"def")).unwrap();
-        assert_eq!(whole.finish().unwrap(), b"abcdef");
-        let mut truncated = SceneAssembly::new(scene.clone());
-        truncated.push(&part(0, b"abc")).unwrap();
-        assert!(truncated.finish().is_err());
-        let mut corrupt = SceneAssembly::new(scene);
-        corrupt.push(&part(0, b"abcdeg")).unwrap();
-        assert!(corrupt.finish().unwrap_err().to_string().contains("hash"));
     }
 }

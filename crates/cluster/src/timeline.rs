@@ -1,4 +1,4 @@
-//! When sample sets show the scene, and how far their light is refined.
+//! When sample sets show the scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -53,21 +53,5 @@ impl Timeline {
         let times = -MAX_SCENE_TIME_S..=MAX_SCENE_TIME_S;
         within(self.start_s, times.clone(), "timeline.start_s", "from -1e6 to 1e6")?;
         within(self.step_s, times, "timeline.step_s", "from -1e6 to 1e6")
-    }
-}
-
-/// How far the light of a set is refined: every step samples it with more rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Refinement {
-    /// From 0 to `steps - 1`, which is full quality.
-    pub step: u32,
-    /// At least 1.
-    pub steps: u32,
-}
-
-impl Default for Refinement {
-    /// Full quality at once.
-    fn default() -> Self {
-        Self { step: 0, steps: 1 }
     }
 }

@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 
-use depth_image::{Aabb, Environment, Illumination, MAX_LIGHTS, PinholeCamera, SampleCamera, ViewGroup, nearest_set};
+use depth_image::{
+    Aabb, Environment, Illumination, MAX_LIGHTS, PinholeCamera, Refinement, SampleCamera, ViewGroup, nearest_set,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty, pinholes, within};
 use crate::common_cell::{CommonCell, CommonKind, check_cube};
 use crate::limits::{MAX_CELLS, MAX_COMMON_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
-use crate::timeline::{Refinement, Timeline};
+use crate::timeline::Timeline;
 
 /// Everything that samples depend on. Methods are text, as on the command line: nodes parse them, so that a new method
 /// changes nothing here. The reconstruction method, the codec, planes, sizes and rate of views belong to requests.
@@ -243,7 +245,12 @@ impl Workload {
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.scene.validate()?;
         self.check_cells()?;
-        self.check_common()?;
+        CommonCell::check_all(&self.common_cells)?;
+        let common = self.common_cells.len();
+        if common > 0 && common >= self.cell_first_indices.len() {
+            let allowed = "fewer than cells: views have one at least";
+            return Err(InvalidField::out_of_range("common_cells", common, allowed));
+        }
         self.check_models()?;
         for camera in &self.sample_cameras {
             camera.validate().map_err(|source| InvalidField::Camera { field: "sample_cameras", source })?;
@@ -307,16 +314,6 @@ impl Workload {
             true => Err(InvalidField::out_of_range("timeline", "of a scene that moves", "still for a layered cube")),
             false => Ok(()),
         }
-    }
-
-    fn check_common(&self) -> Result<(), InvalidField> {
-        CommonCell::check_all(&self.common_cells)?;
-        let common = self.common_cells.len();
-        if common > 0 && common >= self.cell_first_indices.len() {
-            let allowed = "fewer than cells: views have one at least";
-            return Err(InvalidField::out_of_range("common_cells", common, allowed));
-        }
-        Ok(())
     }
 }
 

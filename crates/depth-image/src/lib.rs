@@ -36,6 +36,7 @@ mod view;
 mod view_cell;
 mod view_group;
 mod view_part;
+mod work;
 
 pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
@@ -74,3 +75,4 @@ pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
 pub use view_cell::{ViewCell, nested_places};
 pub use view_group::{ViewGroup, nearest_set};
 pub use view_part::{VIEW_REACH_PX, ViewPart};
+pub use work::{Refinement, Turn, WorkClass};

@@ -14,7 +14,7 @@ use depth_image::{
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
-    UploadedSet, ViewWork, WorkClass, own_time,
+    UploadedSet, ViewWork, own_time,
 };
 use parking_lot::Mutex;
 use reconstruction::{
@@ -203,7 +203,7 @@ impl GpuEngine {
         set: &SampleSet,
         lighting: Lighting,
         images: &[DepthImage],
-        turn: gpu::Turn,
+        turn: Turn,
     ) -> Result<SharedSet, EngineError> {
         let scene = self.scene(&set.scene_hash)?;
         let cache = self.catching(|| self.renderer.upload_light(&scene, lighting, images, turn))?;
@@ -244,15 +244,6 @@ impl GpuEngine {
     }
 }
 
-fn device_turn(Turn { class, flow }: Turn) -> gpu::Turn {
-    let class = match class {
-        WorkClass::Live => gpu::WorkClass::Live,
-        WorkClass::Batch => gpu::WorkClass::Batch,
-        WorkClass::Background => gpu::WorkClass::Background,
-    };
-    gpu::Turn { class, flow }
-}
-
 /// Work of a scene at a moment, with finished light. Surfaces are found as asked, or else by whichever way is faster here.
 fn draw_work(
     scene: &GpuScene,
@@ -266,7 +257,7 @@ fn draw_work(
         Some(false) => Visibility::Triangles,
         None => Visibility::Measured,
     };
-    DrawWork { scene, lighting, scene_time_s, visibility, refinement: Refinement::default(), turn: device_turn(turn) }
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement: Refinement::default(), turn }
 }
 
 impl Engine for GpuEngine {
@@ -321,12 +312,11 @@ impl Engine for GpuEngine {
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
-        let cluster::Refinement { step, steps } = request.refinement;
         let mirrored: Lighting = parsed("lighting", &request.lighting)?;
         // What mirrors show is each view's own.
         let lighting = mirrored.without_reflections().unwrap_or(mirrored);
         let draw = DrawWork {
-            refinement: Refinement { step, steps },
+            refinement: request.refinement,
             ..draw_work(&scene, lighting, request.scene_time_s, request.surfaces_by_rays, turn)
         };
         let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
@@ -355,7 +345,7 @@ impl Engine for GpuEngine {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
         let images = set.images.depth();
         if images.iter().any(|image| image.light.is_some()) {
-            return self.upload_light(set, lighting, images, device_turn(turn));
+            return self.upload_light(set, lighting, images, turn);
         }
         let environment = match set.illumination.environment.is_mapped {
             true => {
@@ -372,7 +362,6 @@ impl Engine for GpuEngine {
             environment: environment.as_ref(),
             mips: set.is_common,
         };
-        let turn = device_turn(turn);
         let set = self.catching(|| match &set.images {
             SampleImages::Depth(images) => self.reconstructor.upload(images, &description, turn),
             SampleImages::Cube(cube) => self.reconstructor.upload_cube(cube, &description, turn),
@@ -410,7 +399,6 @@ impl Engine for GpuEngine {
         let cells: Vec<MirrorCell<'_>> = cells.collect();
         let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy_rays: *glossy_rays };
         let common = CommonSets { mirrors, base: base.as_deref() };
-        let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let request = ReconstructRequest::new(set, cameras, method);
             let request = ReconstructRequest { common, turn, planes: work.planes, ..request };

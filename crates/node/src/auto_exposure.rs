@@ -2,12 +2,12 @@
 
 use cluster::Workload;
 use depth_image::{
-    Aabb, ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes,
+    Aabb, ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, Turn, View, ViewCell, ViewPlanes,
     linear_from_srgb8,
 };
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::engine::{DirectWork, Engine, EngineError, Turn};
+use crate::engine::{DirectWork, Engine, EngineError};
 
 /// The picture that is measured.
 const SIZE_PX: UVec2 = UVec2::splat(64);
@@ -32,7 +32,10 @@ const MOST_PICTURES: usize = 6;
 /// Measures the exposure of a workload on the view in the middle of its first view cell, or else from outside, drawn from the scene at
 /// its start. It is 0 where that view shows no surface.
 pub(crate) fn auto_exposure(engine: &dyn Engine, workload: &Workload, turn: Turn) -> Result<ExposureEv, EngineError> {
-    let camera = default_view(workload).unwrap_or_else(|| view_from_outside(&workload.volume, SIZE_PX));
+    let cameras = workload.cameras_of_cell(0).and_then(|range| workload.sample_cameras.get(range));
+    let cell = cameras.and_then(|cameras| ViewCell::between(&SampleCamera::references(cameras)));
+    let middle = cell.map(|cell| cell.camera_at(Vec2::ZERO, SIZE_PX));
+    let camera = middle.unwrap_or_else(|| view_from_outside(&workload.volume, SIZE_PX));
     exposure_of(|exposure| {
         let tone = ToneMapping { exposure, curve: ToneCurve::None };
         let planes = ViewPlanes { tone, ..ViewPlanes::WITH_DEPTH };
@@ -46,33 +49,20 @@ fn exposure_of<E>(mut brightness_at: impl FnMut(ExposureEv) -> Result<Option<f32
     let mut exposure = ExposureEv::ZERO;
     for _ in 0..MOST_PICTURES {
         let Some(brightness) = brightness_at(exposure)? else { return Ok(ExposureEv::ZERO) };
-        let next = limited(exposure.ev() + step_ev(brightness));
+        // The way to the target, in EV, or towards exposures at which it can be told.
+        let step_ev = match brightness {
+            cut_off if cut_off >= CUT_OFF => DARKER_EV,
+            coarse if coarse <= COARSE => BRIGHTER_EV,
+            known => (TARGET / known).log2(),
+        };
+        let next_ev = (exposure.ev() + step_ev).clamp(-MOST_EV, MOST_EV);
+        let next = ExposureEv::new((next_ev * STEPS_PER_EV).round() / STEPS_PER_EV).unwrap_or_default();
         if (next.ev() - exposure.ev()).abs() < 1.5 / STEPS_PER_EV {
             break;
         }
         exposure = next;
     }
     Ok(exposure)
-}
-
-/// The way to the target, in EV, or towards exposures at which it can be told.
-fn step_ev(brightness: f32) -> f32 {
-    match brightness {
-        cut_off if cut_off >= CUT_OFF => DARKER_EV,
-        coarse if coarse <= COARSE => BRIGHTER_EV,
-        known => (TARGET / known).log2(),
-    }
-}
-
-fn limited(ev: f32) -> ExposureEv {
-    let rounded = (ev.clamp(-MOST_EV, MOST_EV) * STEPS_PER_EV).round() / STEPS_PER_EV;
-    ExposureEv::new(rounded).unwrap_or_default()
-}
-
-/// The view in the middle of the first view cell.
-fn default_view(workload: &Workload) -> Option<PinholeCamera> {
-    let cameras = workload.sample_cameras.get(workload.cameras_of_cell(0)?)?;
-    Some(ViewCell::between(&SampleCamera::references(cameras))?.camera_at(Vec2::ZERO, SIZE_PX))
 }
 
 /// The view of a box from outside, slantwise from above, which depends on no viewer.

@@ -56,9 +56,12 @@ type Loaded<V> = Result<(V, usize), Status>;
 /// The end of a load; `None` before it.
 type Outcome<V> = Option<Result<Pinned<V>, Status>>;
 
+/// A loaded value with its key, and when it was last used.
+type UsedValue<K, V> = (K, Arc<Held<V>>, Instant);
+
 enum Entry<V> {
     Loading(watch::Receiver<Outcome<V>>),
-    Loaded { held: Arc<Held<V>>, last_use: u64, used_at: Instant },
+    Loaded { held: Arc<Held<V>>, used_at: Instant },
 }
 
 struct State<K, V> {
@@ -67,8 +70,6 @@ struct State<K, V> {
     used_bytes: usize,
     /// Loads that wait for room.
     waiting: usize,
-    /// Uses of all values so far.
-    uses: u64,
 }
 
 struct Inner<K, V> {
@@ -80,12 +81,6 @@ struct Inner<K, V> {
     /// has no turn. It may have to wait until hardly anything is in use, and must not keep all others waiting until then.
     turn: tokio::sync::Mutex<()>,
     freed: Arc<Notify>,
-}
-
-/// Sets that a role keeps in memory for later, and can give back.
-pub trait SetMemory: Send + Sync {
-    /// Evicts all sets that are not in use; gives their bytes.
-    fn free(&self) -> usize;
 }
 
 /// Values by key. The least recently used are evicted for new ones. A value that would exceed the bound while all others
@@ -102,7 +97,7 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
     /// An empty cache of `max_bytes`; refusals name its values by `what`.
     #[must_use]
     pub fn new(what: &'static str, max_bytes: usize) -> Self {
-        let state = Mutex::new(State { entries: HashMap::new(), used_bytes: 0, waiting: 0, uses: 0 });
+        let state = Mutex::new(State { entries: HashMap::new(), used_bytes: 0, waiting: 0 });
         Self(Arc::new(Inner { what, max_bytes, state, turn: tokio::sync::Mutex::default(), freed: Arc::default() }))
     }
 
@@ -128,32 +123,33 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
     #[must_use]
     pub fn loaded_where(&self, wanted: impl Fn(&V) -> bool) -> Vec<Pinned<V>> {
         let state = self.0.state.lock();
-        let held = state.entries.values().filter_map(|entry| match entry {
-            Entry::Loaded { held, .. } => Some(held),
-            Entry::Loading(_) => None,
-        });
-        held.filter(|held| wanted(&held.value)).map(Pinned::new).collect()
+        let loaded = state.by_use().into_iter().filter(|(_, held, _)| wanted(&held.value));
+        loaded.map(|(_, held, _)| Pinned::new(&held)).collect()
     }
 
     /// Evicts the least recently used of the values that are `alike` and not in use, until `most` that are alike are left.
     pub fn keep_latest(&self, most: usize, alike: impl Fn(&V) -> bool) {
         let mut state = self.0.state.lock();
-        let mut all: Vec<(u64, K)> = Vec::new();
-        for (key, entry) in &state.entries {
-            if let Entry::Loaded { held, last_use, .. } = entry
-                && alike(&held.value)
-            {
-                all.push((*last_use, key.clone()));
-            }
-        }
-        all.sort_unstable_by_key(|(last_use, _)| *last_use);
-        let beyond: Vec<K> = all.drain(..all.len().saturating_sub(most)).map(|(_, key)| key).collect();
-        let mut evicted = state.unused(Duration::ZERO);
-        evicted.retain(|(key, _)| beyond.contains(key));
-        let evicted = state.evict_until(0, &evicted);
+        let mut beyond = state.by_use();
+        beyond.retain(|(_, held, _)| alike(&held.value));
+        beyond.truncate(beyond.len().saturating_sub(most));
+        beyond.retain(|(_, held, _)| held.pins.load(Ordering::Acquire) == 0);
+        let evicted = state.evict_until(0, beyond);
         drop(state);
         drop(evicted);
         self.0.freed.notify_waiters();
+    }
+
+    /// Evicts all values that are not in use; gives their bytes.
+    pub fn free(&self) -> usize {
+        let mut state = self.0.state.lock();
+        let unused = state.unused(Duration::ZERO);
+        let evicted = state.evict_until(0, unused);
+        drop(state);
+        let freed = evicted.iter().map(|held| held.bytes).sum();
+        drop(evicted);
+        self.0.freed.notify_waiters();
+        freed
     }
 
     /// A value, loaded for the first that asks for it. A load that has begun goes on when those that wait for it leave, and a
@@ -197,11 +193,10 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
         load: impl Future<Output = Loaded<V>> + Send + 'static,
     ) -> bool {
         let mut state = self.0.state.lock();
-        let use_now = state.next_use();
         if let Some(entry) = state.entries.get_mut(&key) {
             // It is about to be used: what is loaded ahead after it must not evict it.
-            if let Entry::Loaded { last_use, used_at, .. } = entry {
-                (*last_use, *used_at) = (use_now, Instant::now());
+            if let Entry::Loaded { used_at, .. } = entry {
+                *used_at = Instant::now();
             }
             return true;
         }
@@ -294,8 +289,7 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
             }
             let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
             let pinned = Pinned::new(&held);
-            let last_use = state.next_use();
-            state.entries.insert(key.clone(), Entry::Loaded { held, last_use, used_at: Instant::now() });
+            state.entries.insert(key.clone(), Entry::Loaded { held, used_at: Instant::now() });
             pinned
         });
         drop(state);
@@ -305,76 +299,58 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
     }
 }
 
-impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> SetMemory for ByteCache<K, V> {
-    fn free(&self) -> usize {
-        let mut state = self.0.state.lock();
-        let before = state.used_bytes;
-        let unused = state.unused(Duration::ZERO);
-        let evicted = state.evict_until(0, &unused);
-        let freed = before - state.used_bytes;
-        drop(state);
-        drop(evicted);
-        self.0.freed.notify_waiters();
-        freed
-    }
-}
-
 impl<K: Clone + Eq + Hash, V> State<K, V> {
-    fn next_use(&mut self) -> u64 {
-        self.uses += 1;
-        self.uses
-    }
-
     fn loaded(&mut self, key: &K) -> Option<Pinned<V>> {
-        let use_now = self.next_use();
         match self.entries.get_mut(key) {
-            Some(Entry::Loaded { held, last_use, used_at }) => {
-                (*last_use, *used_at) = (use_now, Instant::now());
+            Some(Entry::Loaded { held, used_at }) => {
+                *used_at = Instant::now();
                 Some(Pinned::new(held))
             }
             _ => None,
         }
     }
 
-    /// The values that are not in use and were not used within `recently`, the one that was used longest ago first; with
-    /// their bytes.
-    fn unused(&self, recently: Duration) -> Vec<(K, usize)> {
-        let mut unused = Vec::new();
+    /// All loaded values and the times of their last uses, the one that was used longest ago first.
+    fn by_use(&self) -> Vec<UsedValue<K, V>> {
+        let mut loaded = Vec::new();
         for (key, entry) in &self.entries {
-            if let Entry::Loaded { held, last_use, used_at } = entry
-                && held.pins.load(Ordering::Acquire) == 0
-                && used_at.elapsed() >= recently
-            {
-                unused.push((*last_use, key.clone(), held.bytes));
+            if let Entry::Loaded { held, used_at } = entry {
+                loaded.push((key.clone(), held.clone(), *used_at));
             }
         }
-        unused.sort_unstable_by_key(|(last_use, ..)| *last_use);
-        unused.into_iter().map(|(_, key, bytes)| (key, bytes)).collect()
+        loaded.sort_unstable_by_key(|(.., used_at)| *used_at);
+        loaded
+    }
+
+    /// The values that are not in use and were not used within `recently`.
+    fn unused(&self, recently: Duration) -> Vec<UsedValue<K, V>> {
+        let mut unused = self.by_use();
+        unused.retain(|(_, held, used_at)| held.pins.load(Ordering::Acquire) == 0 && used_at.elapsed() >= recently);
+        unused
     }
 
     /// Takes room for `bytes`, with the values that were evicted for it; `None` where too much is in use.
     fn make_room(&mut self, bytes: usize, max_bytes: usize, recently: Duration) -> Option<Vec<Arc<Held<V>>>> {
         let unused = self.unused(recently);
-        let evictable: usize = unused.iter().map(|(_, bytes)| bytes).sum();
+        let evictable: usize = unused.iter().map(|(_, held, _)| held.bytes).sum();
         if self.used_bytes - evictable + bytes > max_bytes {
             return None;
         }
-        let evicted = self.evict_until(max_bytes.saturating_sub(bytes), &unused);
+        let evicted = self.evict_until(max_bytes.saturating_sub(bytes), unused);
         self.used_bytes += bytes;
         Some(evicted)
     }
 
     /// Evicts the first of these values until at most `most_bytes` are used. The caller drops them outside the lock.
-    fn evict_until(&mut self, most_bytes: usize, unused: &[(K, usize)]) -> Vec<Arc<Held<V>>> {
+    fn evict_until(&mut self, most_bytes: usize, unused: Vec<UsedValue<K, V>>) -> Vec<Arc<Held<V>>> {
         let mut evicted = Vec::new();
-        for (key, bytes) in unused {
+        for (key, held, _) in unused {
             if self.used_bytes <= most_bytes {
                 break;
             }
-            self.used_bytes -= bytes;
-            if let Some(Entry::Loaded { held, .. }) = self.entries.remove(key) {
-                evicted.push(held);
-            }
+            self.used_bytes -= held.bytes;
+            self.entries.remove(&key);
+            evicted.push(held);
         }
         evicted
     }

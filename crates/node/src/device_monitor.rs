@@ -5,18 +5,19 @@ use std::any::Any;
 use std::sync::Arc;
 
 use cluster::SamplePlanes;
-use depth_image::{PinholeCamera, SampleImage, View};
+use depth_image::{PinholeCamera, SampleImage, Turn, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
-use crate::byte_cache::SetMemory;
 use crate::engine::{
-    CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
-    ViewWork,
+    CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, UploadedSet, ViewWork,
 };
 
 /// Calls that run out of memory one after the other, until the node leaves.
 const MAX_SHORTAGES: usize = 3;
+
+/// Frees the sets of a cache that are not in use; gives their bytes.
+type FreeMemory = Arc<dyn Fn() -> usize + Send + Sync>;
 
 /// An engine with help for the faults of the device inside. Clones share it.
 #[derive(Clone)]
@@ -25,25 +26,24 @@ pub struct DeviceMonitor {
     lost: watch::Sender<Option<String>>,
     /// Calls that have run out of memory since the last that did not.
     shortages: watch::Sender<usize>,
-    memory: Arc<Mutex<Vec<Arc<dyn SetMemory>>>>,
+    memory: Arc<Mutex<Vec<FreeMemory>>>,
 }
 
 impl DeviceMonitor {
     /// Monitors an engine.
-    #[must_use]
-    pub fn new(engine: Arc<dyn Engine>) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>) -> Self {
         Self { engine, lost: watch::Sender::new(None), shortages: watch::Sender::new(0), memory: Arc::default() }
     }
 
-    /// The sets to free where the device runs out of memory.
-    pub fn set_memory(&self, memory: Vec<Arc<dyn SetMemory>>) {
-        *self.memory.lock() = memory;
+    /// Adds sets to free where the device runs out of memory.
+    pub fn add_memory(&self, free: impl Fn() -> usize + Send + Sync + 'static) {
+        self.memory.lock().push(Arc::new(free));
     }
 
     /// Frees the sets that are not in use; gives their bytes.
     fn free(&self) -> usize {
         let memory = self.memory.lock().clone();
-        memory.iter().map(|memory| memory.free()).sum()
+        memory.iter().map(|free| free()).sum()
     }
 
     /// Resolves when the device is lost, with the reason.

@@ -2,53 +2,14 @@
 
 use std::any::Any;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use cluster::{CommonCell, Refinement, SamplePlanes, Workload};
+use cluster::{CommonCell, SamplePlanes, Workload};
 use depth_image::{
-    Aabb, Environment, Illumination, PinholeCamera, SampleCamera, SampleImage, SampleImageError, SampleImages, View,
-    ViewPlanes,
+    Aabb, Environment, Illumination, PinholeCamera, Refinement, SampleCamera, SampleImage, SampleImageError,
+    SampleImages, Turn, View, ViewPlanes,
 };
 use tonic::Status;
-
-/// The urgency of work on a device, which the nodes of a process share.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum WorkClass {
-    /// Somebody watches.
-    Live,
-    /// Somebody waits.
-    Batch,
-    /// Nobody waits, such as for a measurement.
-    Background,
-}
-
-/// Work's place in the order of its device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Turn {
-    /// A higher class goes first.
-    pub class: WorkClass,
-    /// Flows of a class share the device's time evenly. Numbers come from [`Turn::next_flow`].
-    pub flow: u64,
-}
-
-impl Turn {
-    /// The flow of all work without one of its own.
-    pub const COMMON_FLOW: u64 = 0;
-
-    /// The number of a new flow, which is no other flow's in this process.
-    #[must_use]
-    pub fn next_flow() -> u64 {
-        static LAST: AtomicU64 = AtomicU64::new(Turn::COMMON_FLOW);
-        LAST.fetch_add(1, Ordering::Relaxed) + 1
-    }
-
-    /// Work of a class in the common flow.
-    #[must_use]
-    pub const fn of(class: WorkClass) -> Self {
-        Self { class, flow: Self::COMMON_FLOW }
-    }
-}
 
 /// The operations of a node's device. Calls block; services run them on blocking threads. Methods, sampling and lighting are
 /// text, as on the command line, and are parsed here. Calls fail for text that is unknown, a scene that is not loaded, and a

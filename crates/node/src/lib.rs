@@ -12,6 +12,7 @@ mod engine;
 mod latest;
 mod measure;
 mod membership;
+mod parts;
 mod plan;
 mod port;
 mod scenes;
@@ -25,19 +26,20 @@ mod viewers;
 mod work_done;
 
 pub use blocking::blocking;
-pub use byte_cache::{ByteCache, Pinned, SetMemory};
+pub use byte_cache::{ByteCache, Pinned};
 pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
+pub use depth_image::{Turn, WorkClass};
 pub use device_monitor::DeviceMonitor;
 pub use engine::{
-    CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
-    UploadedSet, ViewWork, WorkClass, own_time,
+    CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, UploadedSet,
+    ViewWork, own_time,
 };
 pub use latest::push_latest;
 pub use membership::keep_membership;
+pub use parts::NodeParts;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use port::Port;
-pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve};
 pub use service::NodeService;
 pub use set_bytes::{depth_images_bytes, most_image_bytes, most_set_bytes, set_bytes};

@@ -6,14 +6,13 @@ use std::fmt::Display;
 use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, SharedLightCosts, TileCosts, TimedSize, Workload};
 use codec::{DecodeLimits, EncodedImage, FrameCodec};
 use codec::{decode_sample_image, encode_sample_image, encode_view};
-use depth_image::{PinholeCamera, SampleCamera, SampleImage, View};
+use depth_image::{PinholeCamera, SampleCamera, SampleImage, Turn, View, WorkClass};
 use glam::UVec2;
 use tonic::Status;
 
 use crate::auto_exposure::auto_exposure;
 use crate::engine::{
-    DirectWork, Engine, LightParts, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time,
-    set_of_view,
+    DirectWork, Engine, LightParts, SampleSet, SampleWork, UploadedSet, ViewWork, own_time, set_of_view,
 };
 
 /// Runs of one operation after a warm-up, in which shaders are built.
@@ -45,13 +44,6 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
     let measured = measurement.costs_in_steps(request, &resized)?;
     // How rays and triangles compare depends on the size of pictures.
     Ok(Measured { traced_pixel_count: engine.traced_pixel_count(&first_view, measurement.turn)?, ..measured })
-}
-
-/// About the time that it takes to measure these costs.
-fn measurement_s(costs: &Costs, workload: &Workload) -> f64 {
-    let set_s = costs.sample_image_s * workload.sample_cameras.len() as f64;
-    let warmed_s = costs.direct_view_s + costs.reconstruct_view_s + costs.encode_view_s;
-    set_s + 2.0 * warmed_s
 }
 
 /// Some views that were reconstructed, and the cost of one.
@@ -160,7 +152,10 @@ impl Measurement<'_> {
                 }
                 let quick = Resized::new(request, ratio, ratio);
                 let measured = quick.in_full_size(self.costs(&quick)?);
-                let next_s = measurement_s(&measured.costs, &request.workload) * f64::from(next_ratio).powi(2);
+                let costs = &measured.costs;
+                let set_s = costs.sample_image_s * request.workload.sample_cameras.len() as f64;
+                let warmed_s = costs.direct_view_s + costs.reconstruct_view_s + costs.encode_view_s;
+                let next_s = (set_s + 2.0 * warmed_s) * f64::from(next_ratio).powi(2);
                 if next_s > LONG_MEASUREMENT_S {
                     return Ok(measured);
                 }

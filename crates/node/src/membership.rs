@@ -6,20 +6,18 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, JoinCluster, NodeStatus, Policy, Welcome, Workload};
 use depth_image::{
-    CubeGrid, LIGHT_FIELD_SIDES, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera, ViewPlanes,
+    CubeGrid, LIGHT_FIELD_SIDES, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera, Turn, ViewPlanes,
+    WorkClass,
 };
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
-use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::auto_exposure::view_from_outside;
 use crate::blocking::blocking;
-use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass, set_of_view};
-use crate::plan::PlansInForce;
-use crate::scenes::Scenes;
-use crate::work_done::WorkDone;
+use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, ViewWork, set_of_view};
+use crate::parts::NodeParts;
 
 /// The interval of a member's reports on its work.
 const REPORT: Duration = Duration::from_secs(1);
@@ -30,22 +28,16 @@ const SIZE_PX: UVec2 = UVec2::splat(16);
 const WARM_UP_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Stays a member until `shutdown`; frames go on while the coordinator is away.
-pub async fn keep_membership(
-    node: NodeStatus,
-    coordinator: String,
-    plans: PlansInForce,
-    scenes: Arc<Scenes>,
-    done: WorkDone,
-    shutdown: CancellationToken,
-) {
+pub async fn keep_membership(parts: Arc<NodeParts>, node: NodeStatus) {
+    let coordinator = &parts.config.coordinator;
     let mut backoff = Backoff::reconnect();
     let mut warmed = false;
     loop {
         let mut joined = false;
-        let request = JoinCluster { node: node.clone(), plan_epoch: plans.epoch() };
+        let request = JoinCluster { node: node.clone(), plan_epoch: parts.plans.epoch() };
         let ended = tokio::select! {
-            ended = member(request, &coordinator, &scenes, &plans, &done, &mut warmed, &mut joined) => ended,
-            () = shutdown.cancelled() => return,
+            ended = member(&parts, request, &mut warmed, &mut joined) => ended,
+            () = parts.shutdown.cancelled() => return,
         };
         if joined {
             backoff.reset();
@@ -53,27 +45,19 @@ pub async fn keep_membership(
         tracing::warn!(node = node.node_name, %coordinator, reason = ended.message(), "no longer a member");
         tokio::select! {
             () = tokio::time::sleep(backoff.next_delay()) => (),
-            () = shutdown.cancelled() => return,
+            () = parts.shutdown.cancelled() => return,
         }
     }
 }
 
 /// One membership, until it ends, with the reason.
-async fn member(
-    request: JoinCluster,
-    coordinator: &str,
-    scenes: &Arc<Scenes>,
-    plans: &PlansInForce,
-    done: &WorkDone,
-    warmed: &mut bool,
-    joined: &mut bool,
-) -> Status {
-    let client = match connect(coordinator).await {
+async fn member(parts: &Arc<NodeParts>, request: JoinCluster, warmed: &mut bool, joined: &mut bool) -> Status {
+    let client = match connect(&parts.config.coordinator).await {
         Ok(channel) => CoordinatorClient::new(channel),
         Err(status) => return status,
     };
     if !std::mem::replace(warmed, true) {
-        warm_up(&client, scenes, plans).await;
+        warm_up(&client, parts).await;
     }
     let mut stream = match client.join_cluster(request).await {
         Ok(stream) => stream,
@@ -83,19 +67,19 @@ async fn member(
     loop {
         tokio::select! {
             message = stream.next() => match message {
-                Some(Ok(welcome)) => preload(welcome, scenes.clone()),
+                Some(Ok(welcome)) => preload(welcome, parts.clone()),
                 Some(Err(status)) => return status,
                 None => return Status::ok("the coordinator ended it"),
             },
-            _ = reports.tick(), if *joined => report(&client, plans, done).await,
+            _ = reports.tick(), if *joined => report(&client, parts).await,
         }
         *joined = true;
     }
 }
 
 /// Reports the work of each workload since the last report; a report that fails is not repeated.
-async fn report(client: &CoordinatorClient, plans: &PlansInForce, done: &WorkDone) {
-    for report in done.take_reports(plans) {
+async fn report(client: &CoordinatorClient, parts: &NodeParts) {
+    for report in parts.metrics.done.take_reports(&parts.plans) {
         match tokio::time::timeout(REPORT, client.report_work(report)).await {
             Ok(Ok(())) => (),
             Ok(Err(status)) => tracing::debug!(reason = status.message(), "the report was refused"),
@@ -105,10 +89,10 @@ async fn report(client: &CoordinatorClient, plans: &PlansInForce, done: &WorkDon
 }
 
 /// Loads offered scenes ahead; a plan that needs one waits for it.
-fn preload(welcome: Welcome, scenes: Arc<Scenes>) {
+fn preload(welcome: Welcome, parts: Arc<NodeParts>) {
     tokio::spawn(async move {
         for scene in welcome.scenes {
-            if let Err(status) = scenes.ensure(&scene).await {
+            if let Err(status) = parts.ensure_scene(&scene).await {
                 tracing::warn!(scene = %scene.hash, reason = status.message(), "not loaded ahead");
             }
         }
@@ -116,26 +100,25 @@ fn preload(welcome: Welcome, scenes: Arc<Scenes>) {
 }
 
 /// Does a little of the work of every plan in force, so that the next finds the node warm. No other node waits for it.
-async fn warm_up(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansInForce) {
+async fn warm_up(client: &CoordinatorClient, parts: &NodeParts) {
+    // A node that has had a plan is warm.
+    if parts.plans.epoch() > 0 {
+        return;
+    }
     let start = Instant::now();
-    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, scenes, plans)).await {
+    let warming = async {
+        for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
+            parts.ensure_scene(&served.assignment.workload.scene).await?;
+            let engine = parts.engine.clone();
+            blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
+        }
+        Ok::<_, Status>(())
+    };
+    match tokio::time::timeout(WARM_UP_TIMEOUT, warming).await {
         Ok(Ok(())) => tracing::debug!(seconds = start.elapsed().as_secs_f64(), "warm"),
         Ok(Err(status)) => tracing::warn!(reason = status.message(), "joins cold"),
         Err(_) => tracing::warn!(reason = "it took too long", "joins cold"),
     }
-}
-
-async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansInForce) -> Result<(), Status> {
-    // A node that has had a plan is warm.
-    if plans.epoch() > 0 {
-        return Ok(());
-    }
-    for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
-        scenes.ensure(&served.assignment.workload.scene).await?;
-        let engine = scenes.engine();
-        blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
-    }
-    Ok(())
 }
 
 /// Makes one small picture of each kind that the plan has, its views by `method`.
@@ -157,15 +140,14 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)
 }
 
-/// The smallest light field.
-const WARM_DIRECTIONS: LightDirections = LightDirections::D66;
-const WARM_SIDE_PX: u32 = *LIGHT_FIELD_SIDES.start();
-
 fn small(workload: &Workload) -> Workload {
     let mut cube = CubeGrid::around(&workload.volume, SIZE_PX.x).into_iter().flat_map(|grid| grid.cameras());
     let sample_cameras = workload.sample_cameras.iter().map(|camera| match camera {
         SampleCamera::Layered(_) => cube.next().map_or(*camera, SampleCamera::from),
-        SampleCamera::LightField(field) => LightFieldCamera::around(field.bounds, WARM_DIRECTIONS, WARM_SIDE_PX).into(),
+        // The smallest one.
+        SampleCamera::LightField(field) => {
+            LightFieldCamera::around(field.bounds, LightDirections::D66, *LIGHT_FIELD_SIDES.start()).into()
+        }
         SampleCamera::Depth(_) => camera.resized(SIZE_PX),
     });
     Workload { sample_cameras: sample_cameras.collect(), ..workload.clone() }

@@ -10,12 +10,9 @@ use tonic::{Status, async_trait};
 use wire::rpc;
 
 use crate::blocking::blocking;
-use crate::config::Quotas;
 use crate::latest::push_latest;
 use crate::measure::measure_costs;
-use crate::plan::PlansInForce;
-use crate::scenes::Scenes;
-use crate::telemetry::NodeMetrics;
+use crate::parts::NodeParts;
 use crate::view_probes::ViewProbes;
 
 /// Measured costs that are cached.
@@ -23,10 +20,7 @@ const MAX_MEASURED: usize = 16;
 
 /// The node's own service.
 pub struct NodeService {
-    plans: PlansInForce,
-    scenes: Arc<Scenes>,
-    quotas: Quotas,
-    metrics: NodeMetrics,
+    node: Arc<NodeParts>,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
     /// One request at a time.
@@ -36,30 +30,23 @@ pub struct NodeService {
 impl NodeService {
     /// The service of one node.
     #[must_use]
-    pub fn new(
-        plans: PlansInForce,
-        scenes: Arc<Scenes>,
-        quotas: Quotas,
-        metrics: NodeMetrics,
-        probes: Arc<dyn ViewProbes>,
-    ) -> Self {
-        let probes = Arc::new(tokio::sync::Mutex::new(probes));
-        Self { plans, scenes, quotas, metrics, measured: Mutex::default(), probes }
+    pub fn new(node: Arc<NodeParts>, probes: Arc<dyn ViewProbes>) -> Self {
+        Self { node, measured: Mutex::default(), probes: Arc::new(tokio::sync::Mutex::new(probes)) }
     }
 
     async fn measure_now(&self, request: &MeasureCosts) -> Result<Measured, Status> {
-        self.scenes.ensure(&request.workload.scene).await?;
-        let engine = self.scenes.engine();
+        self.node.ensure_scene(&request.workload.scene).await?;
+        let engine = self.node.engine.clone();
         let request = request.clone();
         blocking(move || measure_costs(engine.as_ref(), &request)).await
     }
 
     async fn measure_for_budget(&self, request: MeasureCosts, budget: BudgetMeasurement) -> Result<Measured, Status> {
         let planes = ViewPlanes { inverse_depth: true, ..request.planes };
-        self.quotas.check_views(&request.typical_views, planes)?;
+        self.node.config.quotas.check_views(&request.typical_views, planes)?;
         // A call that is cancelled is measured to its end, before the next.
         let probes = self.probes.clone().lock_owned().await;
-        self.scenes.ensure(&request.workload.scene).await?;
+        self.node.ensure_scene(&request.workload.scene).await?;
         blocking(move || probes.probe(&request, &budget)).await
     }
 }
@@ -70,7 +57,8 @@ impl rpc::Node for NodeService {
         if let Some(budget) = request.budget.clone() {
             return self.measure_for_budget(request, budget).await;
         }
-        request.typical_views.chunks(1).try_for_each(|view| self.quotas.check_views(view, request.planes))?;
+        let quotas = self.node.config.quotas;
+        request.typical_views.chunks(1).try_for_each(|view| quotas.check_views(view, request.planes))?;
         let known =
             self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| measured.clone());
         // What is measured in the background was measured before, beside other work.
@@ -80,7 +68,7 @@ impl rpc::Node for NodeService {
         let scene = &request.workload.scene;
         let measured = match self.measure_now(&request).await {
             // The scenes of others may have driven it out meanwhile.
-            Err(_) if !self.scenes.engine().has_scene(scene.hash.as_str()) => self.measure_now(&request).await?,
+            Err(_) if !self.node.engine.has_scene(scene.hash.as_str()) => self.measure_now(&request).await?,
             done => done?,
         };
         let request = MeasureCosts { in_background: false, ..request };
@@ -94,14 +82,14 @@ impl rpc::Node for NodeService {
         let Assignment { plan_epoch, workload_number, workload, .. } = &plan.assignment;
         let plan_epoch = *plan_epoch;
         let workload_number = *workload_number;
-        self.plans.admits(&plan.assignment)?;
-        let scene_load_s = self.scenes.ensure(&workload.scene).await?;
-        let ended = self.plans.apply(plan)?;
+        self.node.plans.admits(&plan.assignment)?;
+        let scene_load_s = self.node.ensure_scene(&workload.scene).await?;
+        let ended = self.node.plans.apply(plan)?;
         if !ended.is_empty() {
-            tracing::info!(node = &*self.plans.node_name, ?ended, "workloads have ended");
+            tracing::info!(node = &*self.node.plans.node_name, ?ended, "workloads have ended");
         }
-        self.metrics.plan_epoch.set(i64::try_from(self.plans.epoch()).unwrap_or(i64::MAX));
-        tracing::info!(node = &*self.plans.node_name, workload_number, plan_epoch, "plan in force");
+        self.node.metrics.plan_epoch.set(i64::try_from(self.node.plans.epoch()).unwrap_or(i64::MAX));
+        tracing::info!(node = &*self.node.plans.node_name, workload_number, plan_epoch, "plan in force");
         Ok(Ready { plan_epoch, scene_load_s })
     }
 }

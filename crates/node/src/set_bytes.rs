@@ -1,9 +1,6 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
-use depth_image::{
-    CubeGrid, DepthImage, Illumination, LayeredDepthImage, LayeredLightField, LightPlanes, SampleCamera, SampleImages,
-    SpecularPlanes,
-};
+use depth_image::{CubeGrid, DepthImage, Illumination, LightPlanes, SampleCamera, SampleImages, SpecularPlanes};
 use glam::UVec3;
 
 /// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
@@ -71,8 +68,17 @@ pub fn set_bytes(images: &SampleImages) -> usize {
     match images {
         SampleImages::Depth(images) => depth_images_bytes(images),
         SampleImages::Cube(cube) => {
-            let images = cube.images.iter().map(layered_bytes).sum::<usize>();
-            cell_bytes(cube.grid.size) + images + cube.light_field.as_ref().map_or(0, light_field_bytes)
+            let images = cube.images.iter().map(|image| {
+                let specular_words = image.specular.as_ref().map_or(0, specular_words);
+                let words = image.normal_oct16.as_ref().map_or(0, Vec::len) + specular_words;
+                image.sample_count() * CUBE_SAMPLE_BYTES + 4 * words
+            });
+            // The first sample of a line, and its end.
+            let light = cube
+                .light_field
+                .as_ref()
+                .map_or(0, |field| 2 * field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES);
+            cell_bytes(cube.grid.size) + images.sum::<usize>() + light
         }
     }
 }
@@ -93,17 +99,6 @@ fn specular_words(specular: &SpecularPlanes) -> usize {
     specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len())
 }
 
-fn layered_bytes(image: &LayeredDepthImage) -> usize {
-    let samples = image.sample_count();
-    let words = image.normal_oct16.as_ref().map_or(0, Vec::len) + image.specular.as_ref().map_or(0, specular_words);
-    samples * CUBE_SAMPLE_BYTES + 4 * words
-}
-
-fn light_field_bytes(field: &LayeredLightField) -> usize {
-    // The first sample of a line, and its end.
-    2 * field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES
-}
-
 fn image_bytes(image: &DepthImage) -> usize {
     let texels = image.inverse_depth_per_m.len();
     if let Some(light) = &image.light {
@@ -121,7 +116,7 @@ fn image_bytes(image: &DepthImage) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use depth_image::{Aabb, CubeImages, PinholeCamera};
+    use depth_image::{Aabb, CubeImages, LayeredDepthImage, PinholeCamera};
     use glam::{UVec2, Vec3};
 
     use super::*;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use axum::{Router, http::header, routing::get};
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use prometheus_client::encoding::{EncodeLabelSet, text::encode};
 use prometheus_client::metrics::{
     counter::Counter,
@@ -25,9 +25,6 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use crate::work_done::WorkDone;
 
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-/// Help texts of metrics.
-const WANTED_FETCHES_ENDED: &str = "Sample sets that a live view waited for and that could not be fetched";
-const UNCOVERED_VIEWS: &str = "Views that a promise is not for, while it is audited";
 
 /// Starts logging. `RUST_LOG` names levels, such as `info` or `warn,coordinator=debug`; where it is not set, `default_levels`
 /// apply. A second call does nothing.
@@ -57,9 +54,20 @@ impl Default for Telemetry {
 }
 
 impl Telemetry {
-    /// The registry, to register metrics in.
-    pub fn registry(&self) -> MutexGuard<'_, Registry> {
-        self.0.lock()
+    /// Registers a metric, in a unit where there is one.
+    pub fn registered<M: Metric + Clone, const UNITS: usize>(
+        &self,
+        name: &str,
+        help: &str,
+        unit: [Unit; UNITS],
+        metric: M,
+    ) -> M {
+        let mut registry = self.0.lock();
+        match unit.into_iter().next() {
+            Some(unit) => registry.register_with_unit(name, help, unit, metric.clone()),
+            None => registry.register(name, help, metric.clone()),
+        }
+        metric
     }
 
     /// The page, in the OpenMetrics text format.
@@ -67,7 +75,7 @@ impl Telemetry {
     pub fn page(&self) -> String {
         let mut page = String::new();
         // Writing to a string does not fail.
-        let _ = encode(&mut page, &self.registry());
+        let _ = encode(&mut page, &self.0.lock());
         page
     }
 
@@ -89,38 +97,74 @@ pub struct Reason {
     pub reason: &'static str,
 }
 
-/// The metrics of a node; their help texts are in [`NodeMetrics::new`].
-#[derive(Debug, Clone)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub struct NodeMetrics {
-    pub images_sampled: Counter,
-    pub image_s: Histogram,
-    pub sets_loaded: Counter,
-    pub set_s: Histogram,
-    pub wanted_fetches_ended: Counter,
-    pub views: Counter,
-    pub view_s: Histogram,
-    pub queue_s: Histogram,
-    pub frame_bytes: Counter,
-    pub dropped: Family<Reason, Counter>,
-    pub audited_views: Counter,
-    pub failed_audits: Counter,
-    pub uncovered_views: Family<Reason, Counter>,
-    pub audit_s: Counter<f64, AtomicU64>,
-    pub streams: Gauge,
-    pub plan_epoch: Gauge,
-    /// The work to report to the coordinator.
-    pub done: WorkDone,
+/// Metrics of a process and their registration, from one list of `field: type, "name" in Unit, "help";`. Other fields, which
+/// are not registered, follow `beside`.
+#[macro_export]
+macro_rules! metrics {
+    (@zero) => { Default::default() };
+    (@zero $zero:expr) => { $zero };
+    (
+        $(#[$about:meta])*
+        pub struct $metrics:ident {
+            $($visibility:vis $field:ident: $metric:ty $(= $zero:expr)?, $name:literal $(in $unit:ident)?, $help:literal;)+
+        } beside {
+            $(#[$about_other:meta])*
+            $visibility_other:vis $other:ident: $type:ty
+        }
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Clone)]
+        #[allow(missing_docs, reason = "self-naming fields")]
+        pub struct $metrics {
+            $($visibility $field: $metric,)+
+            $(#[$about_other])*
+            $visibility_other $other: $type,
+        }
+
+        impl $metrics {
+            /// Registers all metrics, at zero.
+            #[must_use]
+            pub fn new(telemetry: &$crate::Telemetry) -> Self {
+                Self {
+                    $($field: telemetry.registered($name, $help, [$(Unit::$unit)?], $crate::metrics!(@zero $($zero)?)),)+
+                    $other: Default::default(),
+                }
+            }
+        }
+
+        impl Default for $metrics {
+            fn default() -> Self {
+                Self::new(&$crate::Telemetry::default())
+            }
+        }
+    };
 }
 
-fn registered<M: Metric + Clone>(registry: &mut Registry, name: &str, help: &str, metric: M) -> M {
-    registry.register(name, help, metric.clone());
-    metric
-}
-
-fn in_unit<M: Metric + Clone>(registry: &mut Registry, name: &str, help: &str, unit: Unit, metric: M) -> M {
-    registry.register_with_unit(name, help, unit, metric.clone());
-    metric
+metrics! {
+    /// The metrics of a node.
+    pub struct NodeMetrics {
+        pub images_sampled: Counter, "images_sampled", "Images sampled and encoded";
+        pub image_s: Histogram = seconds(), "image" in Seconds, "Sampling of one image";
+        pub sets_loaded: Counter, "sets_loaded", "Sample sets fetched and uploaded";
+        pub wanted_fetches_ended: Counter, "wanted_fetches_ended",
+            "Sample sets that a live view waited for and that could not be fetched";
+        pub set_s: Histogram = seconds(), "set_load" in Seconds, "Loading of one sample set";
+        pub views: Counter, "views", "Views made";
+        pub view_s: Histogram = seconds(), "view" in Seconds, "The device's time for one view";
+        pub queue_s: Histogram = seconds(), "queue" in Seconds, "A view's wait for the device";
+        pub frame_bytes: Counter, "frames" in Bytes, "Encoded frames";
+        pub dropped: Family<Reason, Counter>, "dropped_views", "Views not made or not sent";
+        pub audited_views: Counter, "audited_views", "Views drawn directly as well, and compared";
+        pub failed_audits: Counter, "failed_audits", "Views that could not be compared";
+        pub uncovered_views: Family<Reason, Counter>, "uncovered_views",
+            "Views that a promise is not for, while it is audited";
+        pub audit_s: Counter<f64, AtomicU64>, "audit" in Seconds, "Drawing and comparing for audits";
+        pub streams: Gauge, "streams", "Clients' streams that are open";
+        pub plan_epoch: Gauge, "plan_epoch", "The newest plan in force";
+    } beside {
+        /// The work to report to the coordinator.
+        pub done: WorkDone
+    }
 }
 
 /// A histogram of times.
@@ -129,48 +173,10 @@ fn seconds() -> Histogram {
 }
 
 impl NodeMetrics {
-    /// Registers all metrics, at zero.
-    #[must_use]
-    pub fn new(telemetry: &Telemetry) -> Self {
-        let counter = Counter::default;
-        let gauge = Gauge::default;
-        let to = &mut *telemetry.registry();
-        Self {
-            images_sampled: registered(to, "images_sampled", "Images sampled and encoded", counter()),
-            image_s: in_unit(to, "image", "Sampling of one image", Unit::Seconds, seconds()),
-            sets_loaded: registered(to, "sets_loaded", "Sample sets fetched and uploaded", counter()),
-            wanted_fetches_ended: registered(to, "wanted_fetches_ended", WANTED_FETCHES_ENDED, counter()),
-            set_s: in_unit(to, "set_load", "Loading of one sample set", Unit::Seconds, seconds()),
-            views: registered(to, "views", "Views made", counter()),
-            view_s: in_unit(to, "view", "The device's time for one view", Unit::Seconds, seconds()),
-            queue_s: in_unit(to, "queue", "A view's wait for the device", Unit::Seconds, seconds()),
-            frame_bytes: in_unit(to, "frames", "Encoded frames", Unit::Bytes, counter()),
-            dropped: registered(to, "dropped_views", "Views not made or not sent", Family::default()),
-            audited_views: registered(to, "audited_views", "Views drawn directly as well, and compared", counter()),
-            failed_audits: registered(to, "failed_audits", "Views that could not be compared", counter()),
-            uncovered_views: registered(to, "uncovered_views", UNCOVERED_VIEWS, Family::default()),
-            audit_s: in_unit(to, "audit", "Drawing and comparing for audits", Unit::Seconds, Counter::default()),
-            streams: registered(to, "streams", "Clients' streams that are open", gauge()),
-            plan_epoch: registered(to, "plan_epoch", "The newest plan in force", gauge()),
-            done: WorkDone::default(),
-        }
-    }
-
-    /// Counts a view that a promise is not for.
-    pub fn uncover_view(&self, reason: &'static str) {
-        self.uncovered_views.get_or_create(&Reason { reason }).inc();
-    }
-
     /// Counts a view that was not made or not sent.
     pub fn drop_view(&self, reason: &'static str) {
         self.dropped.get_or_create(&Reason { reason }).inc();
         self.done.dropped();
-    }
-}
-
-impl Default for NodeMetrics {
-    fn default() -> Self {
-        Self::new(&Telemetry::default())
     }
 }
 

@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use cluster::{BudgetMeasurement, MeasureCosts, Measured, ProbedView};
+use cluster::{BudgetMeasurement, MeasureCosts, Measured, ViewErrors};
 use depth_image::{DepthImage, ViewPart};
 use tonic::Status;
 
@@ -21,7 +21,7 @@ pub trait ViewProbes: Send + Sync + 'static {
     ///
     /// # Errors
     /// The device fails.
-    fn audit(&self, view: ViewAudit) -> Result<(ProbedView, f64), Status>;
+    fn audit(&self, view: ViewAudit) -> Result<(ViewErrors, f64), Status>;
 }
 
 /// A view to compare with the same view of the scene.

@@ -38,24 +38,21 @@ impl Viewers {
     /// The viewpoints of a workload; the nearest are merged where there are too many.
     pub(crate) fn of(&self, workload_number: u64) -> Vec<PinholeCamera> {
         let cameras = self.streams.values().filter(|(number, _)| *number == workload_number).map(|(_, camera)| *camera);
-        merged(&cameras.collect::<Vec<_>>())
-    }
-}
-
-fn merged(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
-    let mut apart = 0.0;
-    loop {
-        // The first cameras that are farther from each other than `apart`, until there are too many.
-        let mut kept = Vec::<PinholeCamera>::new();
-        for camera in cameras {
-            if kept.len() <= MAX_REPORTED && kept.iter().all(|other| distance(other, camera) > apart) {
-                kept.push(*camera);
+        let cameras: Vec<_> = cameras.collect();
+        let mut apart = 0.0;
+        loop {
+            // The first cameras that are farther from each other than `apart`, until there are too many.
+            let mut kept = Vec::<PinholeCamera>::new();
+            for camera in &cameras {
+                if kept.len() <= MAX_REPORTED && kept.iter().all(|other| distance(other, camera) > apart) {
+                    kept.push(*camera);
+                }
             }
+            if kept.len() <= MAX_REPORTED {
+                return kept;
+            }
+            apart = (2.0 * apart).max(LEAST_APART);
         }
-        if kept.len() <= MAX_REPORTED {
-            return kept;
-        }
-        apart = (2.0 * apart).max(LEAST_APART);
     }
 }
 

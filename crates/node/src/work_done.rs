@@ -120,6 +120,8 @@ impl WorkDone {
         }
         let reports = workloads.into_iter().filter_map(|(workload_number, sums)| {
             let plan = plans.in_force(workload_number)?;
+            let audit = &sums.audit;
+            let is_audited = !audit.views.is_empty() || audit.covered_views > 0 || audit.uncovered_views > 0;
             Some(WorkReport {
                 node_name: plans.node_name.to_string(),
                 plan_epoch: plan.plan_epoch,
@@ -129,7 +131,7 @@ impl WorkDone {
                 views: sums.views,
                 dropped_views: std::mem::take(&mut work.dropped_views),
                 viewpoints: work.viewers.of(workload_number),
-                audit: (!sums.audit.is_empty()).then_some(sums.audit),
+                audit: is_audited.then_some(sums.audit),
             })
         });
         reports.collect()

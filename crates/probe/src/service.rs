@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use cluster::{BudgetMeasurement, Costs, MeasureCosts, Measured, ProbedView};
+use cluster::{BudgetMeasurement, Costs, MeasureCosts, Measured};
 use depth_image::{PinholeCamera, VIEW_REACH_PX, ViewPlanes};
 use metrics::FLIP_REACH_PX;
 use node::{Engine, EngineError, Turn, ViewAudit, ViewProbes, WorkClass, own_time, push_latest};
 use parking_lot::Mutex;
-use planner::{RowCosts, ViewErrors};
+use planner::ViewErrors;
 use tonic::Status;
 
 use crate::errors_of_views::view_errors;
@@ -51,14 +51,14 @@ impl ViewProbes for Probers {
         let (measured, busy_s) = own_time(self.engine.as_ref(), || measured(&mut prober, request, budget));
         push_latest(&mut probers, prober, MAX_SUBJECTS);
         let (views, costs) = measured?;
-        Ok(Measured { costs, views: views.into_iter().map(probed).collect(), busy_s, ..Measured::default() })
+        Ok(Measured { costs, views, busy_s, ..Measured::default() })
     }
 
-    fn audit(&self, audit: ViewAudit) -> Result<(ProbedView, f64), Status> {
+    fn audit(&self, audit: ViewAudit) -> Result<(ViewErrors, f64), Status> {
         let _cut = self.engine.live_stream();
         let turn = Turn { class: WorkClass::Background, flow: Turn::next_flow() };
         let (errors, busy_s) = own_time(self.engine.as_ref(), || audited(self.engine.as_ref(), turn, audit));
-        Ok((probed(errors.map_err(status)?), busy_s))
+        Ok((errors.map_err(status)?, busy_s))
     }
 }
 
@@ -101,16 +101,13 @@ fn measured(
         } else {
             (Vec::new(), prober.time(&of, &cameras).map_err(status)?)
         };
-        add(&mut costs, &own, cameras.len() as f64 / request.typical_views.len() as f64);
+        let share = cameras.len() as f64 / request.typical_views.len() as f64;
+        costs.sample_image_s += share * own.sample_image_s;
+        costs.load_set_s += share * own.load_set_s;
+        costs.reconstruct_view_s += share * own.reconstruct_view_s;
         places.iter().zip(own_errors).for_each(|(&place, own)| errors[place] = Some(own));
     }
     Ok((errors.into_iter().flatten().collect(), costs))
-}
-
-fn add(costs: &mut Costs, own: &RowCosts, share: f64) {
-    costs.sample_image_s += share * own.sample_image_s;
-    costs.load_set_s += share * own.load_set_s;
-    costs.reconstruct_view_s += share * own.reconstruct_view_s;
 }
 
 fn representation(request: &MeasureCosts, cell: u32) -> Result<Representation, Status> {
@@ -135,11 +132,6 @@ fn subject_of(request: &MeasureCosts, budget: &BudgetMeasurement) -> Subject {
         scene_time_s: workload.timeline.start_s as f32,
         planes: ViewPlanes { antialias: request.planes.antialias, ..ViewPlanes::COLOR },
     }
-}
-
-fn probed(errors: ViewErrors) -> ProbedView {
-    let ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = errors;
-    ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
 }
 
 fn status(error: ProbeError) -> Status {

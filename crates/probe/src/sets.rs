@@ -49,12 +49,9 @@ impl Sets {
 
     pub(crate) fn keep(&mut self, key: SetKey, set: Arc<SampledSet>) {
         self.newest_last.push((key, set));
-        while self.newest_last.len() > 1 && self.bytes() > MAX_BYTES {
-            self.newest_last.remove(0);
+        let mut bytes: usize = self.newest_last.iter().map(|(_, set)| depth_images_bytes(&set.images)).sum();
+        while self.newest_last.len() > 1 && bytes > MAX_BYTES {
+            bytes -= depth_images_bytes(&self.newest_last.remove(0).1.images);
         }
-    }
-
-    fn bytes(&self) -> usize {
-        self.newest_last.iter().map(|(_, set)| depth_images_bytes(&set.images)).sum()
     }
 }

@@ -45,6 +45,7 @@ mod texture;
 mod visibility;
 mod work;
 
+pub use depth_image::Refinement;
 pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
@@ -55,4 +56,4 @@ pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;
 pub use shaders::{SHADERS, shader_sources, templates};
 pub use visibility::{Choice, UnknownVisibility, Visibility};
-pub use work::{DrawWork, LayerSelection, Refinement, SamplePlanes};
+pub use work::{DrawWork, LayerSelection, SamplePlanes};

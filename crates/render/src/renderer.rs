@@ -17,9 +17,9 @@ use crate::light_samples::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
-use crate::work::{DrawWork, LayerSelection, Refinement, SamplePlanes};
+use crate::work::{DrawWork, LayerSelection, SamplePlanes};
 use crate::{
-    GpuScene, Lighting, RenderError,
+    GpuScene, Lighting, Refinement, RenderError,
     layers::{self, LayerKind, Layers},
     redundancy_test::RedundancyTest,
     stages::Stages,

@@ -1,6 +1,6 @@
 //! Requests to draw, besides the cameras.
 
-use depth_image::{Antialias, Highlight};
+use depth_image::{Antialias, Highlight, Refinement};
 use gpu::Turn;
 
 use crate::{GpuScene, Lighting, Visibility};
@@ -30,34 +30,6 @@ impl DrawWork<'_> {
     /// The formula of highlights, where the scene has any.
     pub(crate) fn highlight(self) -> Option<Highlight> {
         self.lighting.highlight().filter(|&highlight| self.scene.has_highlights(highlight))
-    }
-}
-
-/// A step on the way to all rays of a lighting; every step doubles them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Refinement {
-    /// From 0.
-    pub step: u32,
-    /// With the last, all rays have been traced. With only one, nothing is kept from before or for later.
-    pub steps: u32,
-}
-
-impl Default for Refinement {
-    fn default() -> Self {
-        Self { step: 0, steps: 1 }
-    }
-}
-
-impl Refinement {
-    /// The number of `rays` that have been traced with this step.
-    pub(crate) fn share_of(self, rays: u32) -> u32 {
-        let to_go = self.steps.saturating_sub(self.step + 1).min(31);
-        rays.div_ceil(1 << to_go)
-    }
-
-    /// Whether sums are kept for the next step.
-    pub(crate) fn goes_on(self) -> bool {
-        self.step + 1 < self.steps
     }
 }
 

@@ -1,7 +1,7 @@
 //! Messages of probes and audits: bad ones are refused with the field's name, good ones come back as they were.
 
 use cluster::limits::MAX_PROBE_VIEWS;
-use cluster::{Assignment, BudgetMeasurement, MeasureCosts, Measured, ProbedView, WorkReport};
+use cluster::{Assignment, BudgetMeasurement, MeasureCosts, Measured, ViewErrors, WorkReport};
 use depth_image::{Antialias, ViewPlanes};
 
 use crate::message_tests::{
@@ -55,9 +55,9 @@ fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
     let answered = |answer| read::<Measured, _>(to_message::<proto::MeasureCostsResponse, _>(answer));
     assert_eq!(answered(answer(view)), Ok(answer(view)));
     for flip in [f64::NAN, -0.1, 1.1] {
-        assert!(answered(answer(ProbedView { flip, ..view })).unwrap_err().to_string().contains("flip_ratio"));
+        assert!(answered(answer(ViewErrors { flip, ..view })).unwrap_err().to_string().contains("flip_ratio"));
     }
     let mean_square = f64::INFINITY;
-    let refused = answered(answer(ProbedView { mean_square, ..view })).unwrap_err();
+    let refused = answered(answer(ViewErrors { mean_square, ..view })).unwrap_err();
     assert!(refused.to_string().contains("mean_square_ratio"));
 }

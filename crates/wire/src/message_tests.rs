@@ -7,9 +7,9 @@ use cluster::{
     AchievedTime, ApplyPlan, Assignment, AuditOrder, AuditReport, AuditSummary, AuditedView, BudgetRequest,
     ChangeSession, ClusterStatus, CommonCell, CommonKind, CompositorShare, Costs, ErrorInterval, InvalidField,
     JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings,
-    OfferStatus, Policy, PolicyChoice, ProbedView, Promise, PromiseState, Quality, RenderViews, RequestedView,
-    SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest,
-    SharedLightCosts, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
+    OfferStatus, Policy, PolicyChoice, Promise, PromiseState, Quality, RenderViews, RequestedView, SamplePlanes,
+    SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, SharedLightCosts,
+    TileCosts, Timeline, ViewErrors, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{
     FrameCodec, FrameHeader, ImageHeader, InverseDepthRange, MAX_LIGHT_SHARE_PLANES, MAX_VISIBILITY_PLANES,
@@ -163,7 +163,7 @@ fn promise() -> Promise {
             uncovered_views: 30,
             audits_per_s: 0.11,
             busy_s: 1.5,
-            error: Some(ErrorInterval { least: 0.02, mean: 0.03, greatest: 0.05 }),
+            error: Some(ErrorInterval { low: 0.02, mean: 0.03, high: 0.05 }),
             viewers_above: 1,
         }),
     }
@@ -297,8 +297,8 @@ pub(super) fn session_plan() -> SessionPlan {
     }
 }
 
-pub(super) fn probed_view() -> ProbedView {
-    ProbedView { foreground_ratio: 0.5, flip: 0.1, flip_whole: 0.05, mean_square: 0.01, disoccluded_ratio: 0.02 }
+pub(super) fn probed_view() -> ViewErrors {
+    ViewErrors { foreground_ratio: 0.5, flip: 0.1, flip_whole: 0.05, mean_square: 0.01, disoccluded_ratio: 0.02 }
 }
 
 pub(super) fn work_report() -> WorkReport {

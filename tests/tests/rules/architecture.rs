@@ -27,7 +27,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("pictures", &["metrics", "depth-image"]),
     ("planner", &["depth-image"]),
     ("codec", &["depth-image"]),
-    ("cluster", &["codec", "depth-image"]),
+    ("cluster", &["planner", "codec", "depth-image"]),
     ("wire", &["cluster", "codec", "depth-image"]),
     ("node", &["wire", "cluster", "codec", "depth-image"]),
     ("sampler-node", &["node", "wire", "cluster", "codec", "depth-image"]),

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use client::{ClientError, Session};
 use cluster::{Assignment, FetchImages, PolicyChoice, RenderViews, RequestedView, Timeline};
-use cluster_tests::cluster::{Cluster, request, rig, views};
+use cluster_tests::cluster::{Cluster, plan_alone, request, rig, views};
 use cluster_tests::scalar_engine::ScalarEngine;
 use codec::FrameCodec;
 use node::{Deadlines, EngineError, NodeConfig, NodeMetrics, OpenEngine, ServeError};
@@ -53,7 +53,7 @@ async fn replaced_plans_are_refused_by_every_service() {
     let node = NodeClient::new(connect(compositor).await.unwrap());
     let good = raw_request(&session);
     assert_eq!(ask(compositor, good.clone()).await.unwrap(), 1);
-    node.apply_assignment(new.clone().into()).await.unwrap();
+    node.apply_assignment(plan_alone(new.clone())).await.unwrap();
     let refused = ask(compositor, good.clone()).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
     let replaced = format!("plan_epoch {} of workload {} is not in force", old.plan_epoch, old.workload_number);
@@ -61,10 +61,10 @@ async fn replaced_plans_are_refused_by_every_service() {
     assert_eq!(wire::plan_in_force(&refused), Some(new.clone()), "the refusal names the plan in force");
     let followed = RenderViews { plan_epoch: new.plan_epoch, ..good };
     assert_eq!(ask(compositor, followed).await.unwrap(), 1);
-    let refused = node.apply_assignment(old.clone().into()).await.unwrap_err();
+    let refused = node.apply_assignment(plan_alone(old.clone())).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition, "{refused}");
     assert_eq!(
-        node.apply_assignment(new.clone().into()).await.unwrap().plan_epoch,
+        node.apply_assignment(plan_alone(new.clone())).await.unwrap().plan_epoch,
         new.plan_epoch,
         "the same again is no change"
     );

@@ -7,7 +7,7 @@ use client::{ClientError, Frame};
 use cluster::{
     Assignment, FetchImages, Policy, PolicyChoice, RenderViews, RequestedView, SessionRequest, Timeline, Workload,
 };
-use cluster_tests::cluster::{Cluster, camera, request, rig, views, whole_frame};
+use cluster_tests::cluster::{Cluster, camera, plan_alone, request, rig, views, whole_frame};
 use cluster_tests::scalar_engine::Pace;
 use codec::{FrameCodec, WholeFrame};
 use glam::UVec2;
@@ -72,7 +72,7 @@ async fn chained(cluster: &Cluster) -> Assignment {
     drop(session);
     let chain = Assignment { plan_epoch: 100, relay_fanout: NonZeroU32::new(1), ..plan };
     for address in chain.compositors.iter().map(|c| &c.address).chain(chain.samplers.iter().map(|s| &s.address)) {
-        NodeClient::new(connect(address).await.unwrap()).apply_assignment(chain.clone().into()).await.unwrap();
+        NodeClient::new(connect(address).await.unwrap()).apply_assignment(plan_alone(chain.clone())).await.unwrap();
     }
     chain
 }
@@ -164,7 +164,7 @@ async fn next_set_under(change: impl Fn(Assignment) -> Assignment) -> (Result<()
     tokio::time::sleep(Duration::from_millis(100)).await;
     let _ = engine.take_counts();
     let next = change(Assignment { plan_epoch: plan.plan_epoch + 1, ..plan.clone() });
-    NodeClient::new(connect(&share.address).await.unwrap()).apply_assignment(next.into()).await.unwrap();
+    NodeClient::new(connect(&share.address).await.unwrap()).apply_assignment(plan_alone(next)).await.unwrap();
     begun.await.unwrap().unwrap();
     let waited = waits.await.unwrap();
     (waited, !engine.take_counts().is_empty())

@@ -41,20 +41,19 @@ pub struct Shown {
 
 impl Shown {
     pub(super) fn of(frame: &LiveFrame, start: Instant, fallback: u32) -> Self {
-        let here = &frame.times;
         let header = &frame.frame.header;
         let since = |time: Instant| time.saturating_duration_since(start).as_secs_f64();
         let there = header.stage_times;
-        let away_s = here.received.saturating_duration_since(here.sent).as_secs_f64();
+        let away_s = frame.received.saturating_duration_since(frame.sent).as_secs_f64();
         Self {
             frame: frame.frame.request.frame,
-            posed_s: since(here.posed),
-            shown_s: since(here.decoded),
+            posed_s: since(frame.posed),
+            shown_s: since(frame.decoded),
             plan_epoch: header.sample_set_id.plan_epoch,
             set_index: header.sample_set_id.index,
             set_age_s: there.set_age_s,
             stages_s: [
-                since(here.sent) - since(here.posed),
+                since(frame.sent) - since(frame.posed),
                 there.set_wait_s,
                 there.credit_wait_s,
                 there.queue_s,
@@ -62,7 +61,7 @@ impl Shown {
                 there.encode_s,
                 there.send_wait_s,
                 (away_s - there.compositor_s).max(0.0),
-                since(here.decoded) - since(here.received),
+                since(frame.decoded) - since(frame.received),
             ],
             fallback,
         }

@@ -1,6 +1,8 @@
 //! The order in which work goes to the device: by class, and within a class by the time that each flow has had. It reads no
 //! clock.
 
+use depth_image::{Turn, WorkClass};
+
 /// The share of the time of higher classes that a lower class gets while it waits.
 const LOWER_SHARE: f64 = 0.05;
 /// The most that a class owes after slices that took longer than predicted.
@@ -9,32 +11,6 @@ const MOST_DEBT_S: f64 = 1.0;
 const ROUNDING_S: f64 = 1e-9;
 /// The flows of a class that are remembered.
 const MOST_FLOWS: usize = 256;
-
-/// The urgency of work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub enum WorkClass {
-    /// Somebody watches.
-    Live,
-    /// Somebody waits.
-    #[default]
-    Batch,
-    /// Nobody waits, such as for a measurement.
-    Background,
-}
-
-impl WorkClass {
-    /// The number of classes.
-    pub const COUNT: usize = 3;
-}
-
-/// Work's place in the order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Turn {
-    /// A higher class goes first.
-    pub class: WorkClass,
-    /// Flows of a class share its time evenly.
-    pub flow: u64,
-}
 
 /// Work that waits, class by class.
 #[derive(Debug, Default)]

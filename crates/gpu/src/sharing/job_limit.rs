@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use parking_lot::{Condvar, Mutex};
 
-use super::fair_order::WorkClass;
+use super::WorkClass;
 use super::queue::count_waited;
 
 /// Bounds the jobs of each class. A job of one class never waits for one of another.

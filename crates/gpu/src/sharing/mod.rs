@@ -5,7 +5,7 @@ mod job_limit;
 mod queue;
 mod rates;
 
-pub use fair_order::{Turn, WorkClass};
+pub use depth_image::{Turn, WorkClass};
 pub use job_limit::{Job, JobLimit};
 pub(crate) use queue::Slot;
 pub use queue::{DeviceQueue, LiveStream, SLICE_S, waited_s};

@@ -7,7 +7,8 @@ use std::time::Instant;
 
 use parking_lot::{Condvar, Mutex, MutexGuard};
 
-use super::fair_order::{FairOrder, Turn};
+use super::Turn;
+use super::fair_order::FairOrder;
 use super::rates::{Rates, Work};
 
 /// The longest slice that is planned while a live stream is open.
@@ -208,7 +209,7 @@ mod tests {
     use std::thread;
 
     use super::*;
-    use crate::sharing::{fair_order::WorkClass, rates::WorkKind};
+    use crate::sharing::{WorkClass, rates::WorkKind};
 
     fn turn(class: WorkClass, flow: u64) -> Turn {
         Turn { class, flow }

@@ -29,7 +29,11 @@ messages! {
     StageTimes = StageTimes {
         set_wait_s, credit_wait_s, queue_s, batch_s, reconstruct_s, encode_s, send_wait_s, compositor_s, set_age_s,
         batch_count
-    }, then check_times;
+    }, then |times| {
+        check_seconds!(times; set_wait_s, credit_wait_s, queue_s, batch_s, reconstruct_s, encode_s);
+        check_seconds!(times; send_wait_s, compositor_s, set_age_s);
+        Ok::<_, InvalidField>(())
+    };
 }
 
 /// By its name in settings.
@@ -53,10 +57,4 @@ fn check_header(header: &FrameHeader) -> Result<(), InvalidField> {
         0..=MAX_FRAME_BYTES => Ok(()),
         count => Err(InvalidField::TooMany { field: "header.total_bytes", count, limit: MAX_FRAME_BYTES }),
     }
-}
-
-fn check_times(times: &StageTimes) -> Result<(), InvalidField> {
-    check_seconds!(times; set_wait_s, credit_wait_s, queue_s, batch_s, reconstruct_s, encode_s);
-    check_seconds!(times; send_wait_s, compositor_s, set_age_s);
-    Ok(())
 }

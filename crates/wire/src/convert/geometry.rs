@@ -26,7 +26,11 @@ messages! {
     }, valid or Camera;
     SinglePoleCamera = SinglePoleCamera {
         reference as "camera.single_pole.reference", pole_px as "camera.single_pole.pole_px", distortion_px, farthest_m
-    }, valid or Camera, then check_pole;
+    }, valid or Camera, then |camera| match camera.reference.contains(camera.pole_px) {
+        true => Ok(()),
+        // Tiles, which do not hold the pole of their image, do not travel.
+        false => Err(InvalidField::out_of_range("camera.single_pole.pole_px", camera.pole_px, "in the image")),
+    };
     ParallelCamera = ParallelCamera {
         spacing_m, range_m; corner_in_world: corner_in_world_m as "camera.parallel.corner_in_world_m",
         world_from_camera: world_from_camera_unit as "camera.parallel.world_from_camera_unit",
@@ -59,14 +63,6 @@ impl Convert<proto::Quaternion> for Quat {
     fn write(self) -> proto::Quaternion {
         proto::Quaternion { x: self.x, y: self.y, z: self.z, w: self.w }
     }
-}
-
-/// Tiles, which do not hold the pole of their image, do not travel.
-fn check_pole(camera: &SinglePoleCamera) -> Result<(), InvalidField> {
-    if camera.reference.contains(camera.pole_px) {
-        return Ok(());
-    }
-    Err(InvalidField::out_of_range("camera.single_pole.pole_px", camera.pole_px, "in the image"))
 }
 
 impl Convert<proto::Camera> for Camera {

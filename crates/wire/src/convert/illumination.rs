@@ -14,11 +14,7 @@ messages! {
     Environment = Environment {
         is_mapped; zenith_linear: zenith_linear_rgb as "environment.zenith_linear_rgb",
         nadir_linear: nadir_linear_rgb as "environment.nadir_linear_rgb"
-    }, then check_environment;
-}
-
-fn check_environment(environment: &Environment) -> Result<(), InvalidField> {
-    environment.validate().map_err(|source| InvalidField::Light { field: "illumination.environment", source })
+    }, then |e| e.validate().map_err(|source| InvalidField::Light { field: "illumination.environment", source });
 }
 
 /// Both conversions of lights from one list of the kinds, as `messages!` has it.

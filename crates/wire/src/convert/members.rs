@@ -3,8 +3,8 @@
 use cluster::limits::{MAX_BATCH, MAX_PROBE_VIEWS, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
     AchievedTime, AuditReport, AuditedView, BudgetMeasurement, ClusterStatus, JoinCluster, MeasureCosts, Measured,
-    NodeCondition, NodeStatus, ProbedView, Ready, SamplerReport, SharedLightCosts, Welcome, WorkReport, WorkloadStatus,
-    at_most,
+    NodeCondition, NodeStatus, Ready, SamplerReport, SharedLightCosts, ViewErrors, Welcome, WorkReport, WorkloadStatus,
+    at_most, finite_seconds,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};
@@ -27,11 +27,11 @@ messages! {
     }, first |r| at_most(r.views.len(), MAX_BATCH as usize, "views"), then Measured::validate;
     SharedLightCosts = SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s },
         then SharedLightCosts::validate;
-    ProbedView = ProbedView {
+    ProbedView = ViewErrors {
         foreground_ratio, disoccluded_ratio;
         flip: flip_ratio, flip_whole: flip_whole_ratio, mean_square: mean_square_ratio
     };
-    ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
+    ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then |r| finite_seconds(r.scene_load_s, "scene_load_s");
     ReportWorkRequest = WorkReport {
         node_name, plan_epoch, workload_number, busy_s, viewpoints, audit;
         costs: sample_image_s | direct_view_s | reconstruct_view_s | load_set_s | encode_view_s | transfer_bytes_per_s

@@ -50,7 +50,7 @@ messages! {
         audited_views: audited_view_count, covered_views: covered_view_count, uncovered_views: uncovered_view_count,
         viewers_above: viewer_above_count
     };
-    ErrorInterval = ErrorInterval { ; least: least_ratio, mean: mean_ratio, greatest: greatest_ratio };
+    ErrorInterval = ErrorInterval { ; low: least_ratio, mean: mean_ratio, high: greatest_ratio };
 }
 
 impl Convert<(f64, f64, f64, f64)> for SourceSpace {

@@ -7,7 +7,7 @@ use cluster::{
     ApplyPlan, Assignment, LiveRequest, Policy, RenderViews, RequestedView, SamplerShare, SessionRequest, Timeline,
     Workload,
 };
-use cluster_tests::cluster::{Cluster, camera, rig, views, whole_frame};
+use cluster_tests::cluster::{Cluster, camera, plan_alone, rig, views, whole_frame};
 use cluster_tests::scalar_engine::LIGHT_CACHE;
 use cluster_tests::watcher::eventually;
 use codec::{FrameHeader, WholeFrame};
@@ -61,7 +61,7 @@ fn sampled(rig: Vec<Camera>) -> Vec<SampleCamera> {
 async fn apply(cluster: &Cluster, plan: &Assignment) {
     for node in &cluster.nodes {
         let node = NodeClient::new(connect(&node.address).await.unwrap());
-        node.apply_assignment(plan.clone().into()).await.unwrap();
+        node.apply_assignment(plan_alone(plan.clone())).await.unwrap();
     }
 }
 

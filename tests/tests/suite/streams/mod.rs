@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use client::{ClientError, LiveView};
 use cluster::{SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, camera, views};
+use cluster_tests::cluster::{Cluster, camera, plan_alone, views};
 use tokio::time::timeout;
 use tokio_stream::StreamExt as _;
 use tonic::Code;
@@ -143,12 +143,12 @@ async fn a_plan_of_the_same_workload_serves_clients_of_the_plan_before() {
     assert_eq!(raw.frame().await, Some(1));
     let node = wire::rpc::NodeClient::new(connect(&address).await.unwrap());
     let plan = session.plan().assignment;
-    node.apply_assignment(cluster::Assignment { plan_epoch: epoch + 1, ..plan.clone() }.into()).await.unwrap();
+    node.apply_assignment(plan_alone(cluster::Assignment { plan_epoch: epoch + 1, ..plan.clone() })).await.unwrap();
     raw.say(Some(2), 1).await;
     let part = timeout(HEALED, raw.parts.next()).await.unwrap().unwrap().unwrap();
     assert_eq!((part.frame, part.header.unwrap().sample_set_id.plan_epoch), (2, epoch + 1));
     let workload = cluster::Workload { refinement_steps: 2, ..plan.workload.clone() };
-    node.apply_assignment(cluster::Assignment { plan_epoch: epoch + 2, workload, ..plan.clone() }.into())
+    node.apply_assignment(plan_alone(cluster::Assignment { plan_epoch: epoch + 2, workload, ..plan.clone() }))
         .await
         .unwrap();
     raw.say(Some(3), 2).await;

@@ -35,10 +35,7 @@ pub async fn seen(live: &mut LiveView, x_m: f32, set_index: u32) -> LiveFrame {
         let t = header.stage_times;
         let stages = t.set_wait_s + t.credit_wait_s + t.queue_s + t.batch_s + t.encode_s + t.send_wait_s;
         assert!((stages - t.compositor_s).abs() < 1e-3, "{t:?}");
-        assert!(
-            t.compositor_s <= received.times.received.duration_since(received.times.sent).as_secs_f64() + 1e-3,
-            "{t:?}"
-        );
+        assert!(t.compositor_s <= received.received.duration_since(received.sent).as_secs_f64() + 1e-3, "{t:?}");
         if received.frame.request.frame == number {
             assert_eq!(header.camera, camera(x_m, SIZE_PX));
             assert_eq!(header.sample_set_id.index, u64::from(set_index));
