@@ -7,8 +7,9 @@ use tokio_util::sync::CancellationToken;
 
 use crate::config::GatewayConfig;
 use crate::scenes::Scenes;
-use crate::views::PLACES;
 
+/// Views over HTTP that are made, wait, or are read.
+pub(crate) const VIEW_PLACES: usize = 68;
 /// Pages that wait for a place.
 const MAX_WAITING: usize = 64;
 
@@ -33,7 +34,7 @@ impl Gateway {
             scenes: Scenes::new(config.clone()),
             visitors: Semaphore::new(config.max_visitors),
             pages: Arc::new(Semaphore::new(config.max_visitors + MAX_WAITING)),
-            single_views: Arc::new(Semaphore::new(PLACES)),
+            single_views: Arc::new(Semaphore::new(VIEW_PLACES)),
             comparison: Semaphore::new(1),
             config,
             shutdown,

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use tokio::sync::OwnedSemaphorePermit;
 
 use crate::camera::PageCamera;
-use crate::gateway::Gateway;
+use crate::gateway::{Gateway, VIEW_PLACES};
 use crate::kept_session::KeptSession;
 use crate::protocol;
 use crate::responses::{Refusal, as_json, held};
@@ -24,8 +24,6 @@ use crate::scenes::SceneSessions;
 use crate::still::PlannedLight;
 use crate::visits::Visit;
 
-/// Views that are made, wait, or are read.
-pub(crate) const PLACES: usize = 68;
 /// The size of a view that names none.
 const SIZE_PX: UVec2 = UVec2::new(640, 360);
 /// The JPEG quality of views.
@@ -154,7 +152,7 @@ impl Visited {
         method: Option<String>,
     ) -> Result<SingleView, Refusal> {
         let place = gateway.single_views.clone().try_acquire_owned().map_err(|_| {
-            let reason = format!("{PLACES} views are under way already: try again later");
+            let reason = format!("{VIEW_PLACES} views are under way already: try again later");
             Refusal(StatusCode::TOO_MANY_REQUESTS, reason)
         })?;
         let shown = self.shown();

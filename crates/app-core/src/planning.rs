@@ -13,7 +13,6 @@ use render::Lighting;
 use sampling::SamplingMethod;
 
 use crate::exit::BadInput;
-use crate::ladder::rows;
 use crate::setup::{SceneArgs, Setup};
 
 /// The views to plan for.
@@ -62,7 +61,7 @@ impl Planning {
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();
         let fixed_px = args.sample_size.fixed_px();
         let whole_px = fixed_px.or_else(|| fitting_size_px(&rig, &view)).context("the views have no size")?;
-        let rows = rows(args, setup.around.len() as u32);
+        let rows = args.rows(setup.around.len() as u32);
         let mut representations = Vec::with_capacity(rows.len());
         for row in &rows {
             let sampling = row.sampling.parse::<SamplingMethod>()?.with_images(row.camera_count);

@@ -20,7 +20,6 @@ use scene::{
 use crate::camera_file::{self, Placement};
 use crate::delivery::default_method;
 use crate::exit::BadInput;
-use crate::ladder::rows;
 use crate::sizes::SampleSize;
 
 /// The size of the sample images, as in the paper.
@@ -220,7 +219,7 @@ impl SceneArgs {
             base,
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
-            rows: rows(self, around.len() as u32),
+            rows: self.rows(around.len() as u32),
             keeps_cameras: self.samples.is_some(),
             volume: scene.bounds(),
             background: scene.background,

@@ -3,7 +3,7 @@
 use depth_image::View;
 use image::{ImageBuffer, Luma, RgbImage};
 
-use crate::Legend;
+use crate::provenance::Legend;
 
 /// 16-bit grey.
 pub type Grey16 = ImageBuffer<Luma<u16>, Vec<u16>>;

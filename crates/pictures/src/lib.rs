@@ -14,11 +14,8 @@ use image::RgbImage;
 pub use camera_frame::camera_frame;
 pub use depth::{Grey16, depth, inverse_depth_16};
 pub use error_map::error_map;
-pub use provenance::provenance;
+pub use provenance::{Legend, provenance};
 pub use text::TextStyle;
-
-/// Names of the colours of a picture.
-pub type Legend = Vec<(String, [u8; 3])>;
 
 /// The colour of a view; `None` where its plane is not of its size.
 #[must_use]

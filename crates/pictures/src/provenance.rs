@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use depth_image::{Provenance, ProvenanceKind, View};
 use image::RgbImage;
 
-use crate::Legend;
+/// Names of the colours of a picture.
+pub type Legend = Vec<(String, [u8; 3])>;
 
 /// Colours of sample cameras; more cameras repeat them.
 const CAMERAS: [[u8; 3]; 8] = [

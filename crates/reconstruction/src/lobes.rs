@@ -11,54 +11,6 @@ use crate::reflectors::Reflection;
 use crate::view_work::SetVariant;
 use crate::{device::Device, error::ReconstructionError, recording::Recording};
 
-/// How a surface's lobe is lit, beside the rays off mirrors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum LobeLight {
-    /// What smooth surfaces mirror is gathered in a light field.
-    GatheredMirrors,
-    /// What no ray off a mirror brings is gathered.
-    GatheredRest,
-    /// All is gathered.
-    Gathered,
-    /// Rays are sent for what no ray off a mirror brings.
-    SentRest,
-    /// Rays are sent for all.
-    Sent,
-}
-
-impl LobeLight {
-    pub const ALL: [Self; 5] = [Self::GatheredMirrors, Self::GatheredRest, Self::Gathered, Self::SentRest, Self::Sent];
-
-    /// For the surfaces that pixels show. `followed` of `mirrors` are followed; rough surfaces may be glossy.
-    pub fn of_pixels(followed: u32, mirrors: u32, glossy: bool, has_light_field: bool) -> Option<Self> {
-        match (followed < mirrors && followed == 0, glossy, has_light_field) {
-            (true, true, _) => Some(Self::Gathered),
-            (true, false, _) => Some(Self::GatheredMirrors),
-            (false, true, true) => Some(if mirrors > 0 { Self::GatheredRest } else { Self::Gathered }),
-            (false, true, false) => Some(Self::sent(mirrors > 0)),
-            (false, false, _) => None,
-        }
-    }
-
-    /// By rays, beside those off mirrors where these are followed.
-    pub fn sent(beside_mirrors: bool) -> Self {
-        if beside_mirrors { Self::SentRest } else { Self::Sent }
-    }
-
-    pub fn is_sent(self) -> bool {
-        matches!(self, Self::SentRest | Self::Sent)
-    }
-
-    /// In a shader, of a mirror.
-    pub fn share(self) -> &'static str {
-        match self {
-            Self::GatheredMirrors => "mirror_share(mirror.reflector.roughness)",
-            Self::GatheredRest | Self::SentRest => "1.0 - mirror_share(mirror.reflector.roughness)",
-            Self::Gathered | Self::Sent => "1.0",
-        }
-    }
-}
-
 /// `LobeRays` of `bounce/lobe_rays.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

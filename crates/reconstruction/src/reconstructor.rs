@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, Submitted, TablePool, Turn, WorkKind};
 
@@ -11,14 +11,15 @@ use crate::antialias::{self, Sums};
 use crate::bounce::{self, Bounces, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
 use crate::in_flight::{BatchViews, submit};
-use crate::lobes::{GlossyList, LobeLight};
+use crate::lobes::GlossyList;
 use crate::methods::layered::{self, Ends, Walked};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
-use crate::sample_set::SampleSet;
+use crate::reflectors::LobeLight;
+use crate::sample_set::{self, SampleSet};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
-use crate::{fill, shaders::templates, specular, tile_start};
+use crate::{fill, set_description::SetDescription, shaders::templates, specular, tile_start};
 
 /// Calls of one class that are under way at once: each holds the memory of two batches.
 const CALLS_OF_A_CLASS: usize = 4;
@@ -26,7 +27,7 @@ const CALLS_OF_A_CLASS: usize = 4;
 /// Passes for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
     pub(crate) device: Device,
-    pub(crate) tables: TablePool,
+    tables: TablePool,
     drawing: QuadDrawing,
     calls: JobLimit,
 }
@@ -98,6 +99,35 @@ impl Reconstructor {
             calls: JobLimit::of(CALLS_OF_A_CLASS),
             device: Device { gpu: gpu.clone(), buffers: BufferPool::new(gpu), passes: PassCache::new(gpu, &templates) },
         })
+    }
+
+    /// Puts a sample set on the device: builds pyramids and uploads everything.
+    ///
+    /// # Errors
+    /// Too many images, images, cameras or a volume that cannot be used, light in place of colour, or the device's limits.
+    pub fn upload(
+        &self,
+        images: &[DepthImage],
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<SampleSet, ReconstructionError> {
+        sample_set::check(&self.tables, images, set)?;
+        SampleSet::of_images(&self.tables, images, set, turn)
+    }
+
+    /// Puts a layered depth cube on the device, with its light field if it has one.
+    ///
+    /// # Errors
+    /// Images that are not those of the grid's lines, a light field or a volume that cannot be used, or the device's limits.
+    pub fn upload_cube(
+        &self,
+        cube: &CubeImages,
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<SampleSet, ReconstructionError> {
+        sample_set::check_volume(&set.volume)?;
+        let without_images = SampleSet::of_images(&self.tables, &[], set, turn)?;
+        Ok(SampleSet { cube: Some(Arc::new(Cube::upload(&self.tables, cube, set, turn)?)), ..without_images })
     }
 
     /// One view a camera, in their order.

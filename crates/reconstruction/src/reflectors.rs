@@ -1,17 +1,19 @@
 //! The light that the samples of a set reflect towards a viewer, on the device.
 
-use depth_image::{DepthImage, Highlight, Illumination, LayeredDepthImage, ROUGHEST_MIRROR, SpecularPlanes};
+use depth_image::{
+    DepthImage, Highlight, Illumination, LayeredDepthImage, MAX_MIRROR_CELLS, ROUGHEST_MIRROR, SpecularPlanes,
+};
 use gpu::{Binding, GpuError, Table, TablePool, Turn, highlight_name, illumination_bytes, light_slots};
 use minijinja::{Value, context};
 use wgpu::{BufferUsages, TextureFormat};
 
-use crate::bounce::MAX_RAY_LISTS;
-use crate::view_work::SetVariant;
-use crate::{error::ReconstructionError, lobes::LobeLight, set_description::SetDescription};
+use crate::{error::ReconstructionError, set_description::SetDescription, view_work::SetVariant};
 
 /// A normal and a reflector stand before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;
 const ALL_VISIBLE: u32 = u32::MAX;
+/// Lists of rays: one for each mirror cell, and one for a base.
+const MAX_RAY_LISTS: usize = MAX_MIRROR_CELLS + 1;
 
 /// The reflectors of a set in which anything has a highlight.
 pub(crate) struct Reflectors {
@@ -66,6 +68,54 @@ impl Reflectors {
 /// Texels that a sample's words take.
 const fn sample_texels(visibility_words: usize) -> usize {
     (WORDS_BEFORE_VISIBILITY + visibility_words).div_ceil(4)
+}
+
+/// How a surface's lobe is lit, beside the rays off mirrors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LobeLight {
+    /// What smooth surfaces mirror is gathered in a light field.
+    GatheredMirrors,
+    /// What no ray off a mirror brings is gathered.
+    GatheredRest,
+    /// All is gathered.
+    Gathered,
+    /// Rays are sent for what no ray off a mirror brings.
+    SentRest,
+    /// Rays are sent for all.
+    Sent,
+}
+
+impl LobeLight {
+    pub const ALL: [Self; 5] = [Self::GatheredMirrors, Self::GatheredRest, Self::Gathered, Self::SentRest, Self::Sent];
+
+    /// For the surfaces that pixels show. `followed` of `mirrors` are followed; rough surfaces may be glossy.
+    pub fn of_pixels(followed: u32, mirrors: u32, glossy: bool, has_light_field: bool) -> Option<Self> {
+        match (followed < mirrors && followed == 0, glossy, has_light_field) {
+            (true, true, _) => Some(Self::Gathered),
+            (true, false, _) => Some(Self::GatheredMirrors),
+            (false, true, true) => Some(if mirrors > 0 { Self::GatheredRest } else { Self::Gathered }),
+            (false, true, false) => Some(Self::sent(mirrors > 0)),
+            (false, false, _) => None,
+        }
+    }
+
+    /// By rays, beside those off mirrors where these are followed.
+    pub fn sent(beside_mirrors: bool) -> Self {
+        if beside_mirrors { Self::SentRest } else { Self::Sent }
+    }
+
+    pub fn is_sent(self) -> bool {
+        matches!(self, Self::SentRest | Self::Sent)
+    }
+
+    /// In a shader, of a mirror.
+    pub fn share(self) -> &'static str {
+        match self {
+            Self::GatheredMirrors => "mirror_share(mirror.reflector.roughness)",
+            Self::GatheredRest | Self::SentRest => "1.0 - mirror_share(mirror.reflector.roughness)",
+            Self::Gathered | Self::Sent => "1.0",
+        }
+    }
 }
 
 /// The switches of shaders that show what samples reflect: `highlight.wgsl`, `gathered.wgsl`, and those that list the rays off

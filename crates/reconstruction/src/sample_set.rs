@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, CubeImages, DepthImage, PinholeCamera};
+use depth_image::{Aabb, DepthImage, PinholeCamera};
 use glam::{UVec2, Vec2};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -12,7 +12,6 @@ use wgpu::{BufferUsages, TextureFormat};
 use crate::bounce::mips::{mip_texels, mips};
 use crate::cube::Cube;
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
-use crate::reconstructor::Reconstructor;
 use crate::reflectors::{ReflectingPlanes, Reflectors};
 use crate::single_pole::{GpuPole, poles};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
@@ -63,7 +62,7 @@ impl SampleSet {
     }
 
     /// A set of images that were checked, of which there may be none.
-    fn of_images(
+    pub(crate) fn of_images(
         tables: &TablePool,
         images: &[DepthImage],
         set: &SetDescription<'_>,
@@ -126,37 +125,6 @@ impl SampleSet {
     }
 }
 
-impl Reconstructor {
-    /// Puts a sample set on the device: builds pyramids and uploads everything.
-    ///
-    /// # Errors
-    /// Too many images, images, cameras or a volume that cannot be used, light in place of colour, or the device's limits.
-    pub fn upload(
-        &self,
-        images: &[DepthImage],
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<SampleSet, ReconstructionError> {
-        check(&self.tables, images, set)?;
-        SampleSet::of_images(&self.tables, images, set, turn)
-    }
-
-    /// Puts a layered depth cube on the device, with its light field if it has one.
-    ///
-    /// # Errors
-    /// Images that are not those of the grid's lines, a light field or a volume that cannot be used, or the device's limits.
-    pub fn upload_cube(
-        &self,
-        cube: &CubeImages,
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<SampleSet, ReconstructionError> {
-        check_volume(&set.volume)?;
-        let without_images = SampleSet::of_images(&self.tables, &[], set, turn)?;
-        Ok(SampleSet { cube: Some(Arc::new(Cube::upload(&self.tables, cube, set, turn)?)), ..without_images })
-    }
-}
-
 /// One image, as shaders see it.
 struct CodedImage {
     uncertain: bool,
@@ -195,7 +163,11 @@ impl CodedImage {
     }
 }
 
-fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) -> Result<(), ReconstructionError> {
+pub(crate) fn check(
+    tables: &TablePool,
+    images: &[DepthImage],
+    set: &SetDescription<'_>,
+) -> Result<(), ReconstructionError> {
     if images.is_empty() || images.len() > MAX_SAMPLE_CAMERAS {
         return Err(ReconstructionError::SampleCount(images.len()));
     }
@@ -217,7 +189,7 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
     Ok(())
 }
 
-fn check_volume(volume: &Aabb) -> Result<(), ReconstructionError> {
+pub(crate) fn check_volume(volume: &Aabb) -> Result<(), ReconstructionError> {
     if volume.is_empty() || !volume.size().is_finite() { Err(ReconstructionError::Volume) } else { Ok(()) }
 }
 

@@ -4,9 +4,9 @@ use gpu::{ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, RayLists};
-use crate::lobes::{GlossyList, LobeLight};
+use crate::reflectors::{LobeLight, Reflection};
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::Reflection};
+use crate::{error::ReconstructionError, lobes::GlossyList, pixel_list::PixelList, recording::Recording};
 
 /// The switches of `specular.wgsl`.
 #[derive(Debug)]

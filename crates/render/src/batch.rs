@@ -11,7 +11,7 @@ use gpu::{
 
 use crate::accumulation::Sums;
 use crate::pixel_camera::{PixelCamera, uniform};
-use crate::{RenderError, rays::Traced, stages::Stages, work::DrawWork};
+use crate::{RenderError, rays::Traced, work::DrawWork};
 use crate::{known_samples::ImageSequence, light_samples::CachedLight, pieces::Piece, planes::Output};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
@@ -199,12 +199,12 @@ impl<'a> Batch<'a> {
     /// A recording over `count` listed points, and the parts of their rays.
     pub fn record_points<'r>(
         &'r self,
-        stages: &'r Stages,
+        gpu: &'r Gpu,
+        passes: &'r PassCache,
         label: &'static str,
         sums: PooledBuffer,
         count: u32,
     ) -> (Recording<'r>, Vec<Part>) {
-        let Stages { gpu, passes, .. } = stages;
         let rays = self.wanted_rays().map(|rays| 0..rays);
         let parts = self.parts_of_points(gpu, &rays, count);
         let cameras = parts[0].cameras.clone();

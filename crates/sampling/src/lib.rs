@@ -8,10 +8,12 @@ mod rig;
 mod sampler;
 pub mod scalar;
 mod temporal_hysteresis;
+mod work;
 
 pub use error::SamplingError;
 pub use impostors::{Impostors, UnknownImpostors};
 pub use methods::{LayeredCube, LightFieldSize, METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
 pub use mirrors::{Mirror, mirrors};
 pub use rig::{Rig, RigError};
-pub use sampler::{SampleWork, Sampler, renderer};
+pub use sampler::{Sampler, renderer};
+pub use work::SampleWork;

@@ -4,30 +4,9 @@ use std::sync::Arc;
 
 use depth_image::{Antialias, Camera, DepthImage};
 use gpu::Gpu;
-use render::{DrawWork, RenderError, Renderer, SamplePlanes};
+use render::{RenderError, Renderer, SamplePlanes};
 
-use crate::{
-    error::SamplingError,
-    methods::{SamplingMethod, templates},
-    temporal_hysteresis::TemporalHysteresis,
-};
-
-/// Images of a set, and how they are taken.
-#[derive(Clone, Copy)]
-pub struct SampleWork<'a> {
-    /// The scene, its moment and its light.
-    pub draw: DrawWork<'a>,
-    /// The cameras of the whole set: a later image depends on those before it.
-    pub cameras: &'a [Camera],
-    /// The images that are taken. Images in sequence are taken all together.
-    pub wanted: &'a [u32],
-    /// The choice of samples.
-    pub method: SamplingMethod,
-    /// Planes beside colour and depth.
-    pub planes: SamplePlanes,
-    /// The moment of the temporal reference, where the method has hysteresis.
-    pub temporal_reference_s: Option<f32>,
-}
+use crate::{error::SamplingError, methods::templates, temporal_hysteresis::TemporalHysteresis, work::SampleWork};
 
 /// Takes samples; shares its pipelines with direct rendering.
 pub struct Sampler {

@@ -7,7 +7,7 @@ use depth_image::Camera;
 use parking_lot::Mutex;
 use render::{DrawWork, RedundancyTest, RenderError, Renderer, TemporalReference};
 
-use crate::{SampleWork, methods::SamplingMethod};
+use crate::{methods::SamplingMethod, work::SampleWork};
 
 /// The last temporal reference: it serves the sets after it.
 #[derive(Default)]

@@ -15,8 +15,8 @@ struct Habit {
 
 const HABITS: [Habit; 3] = [
     Habit { name: "`let (a, b) = (x, y)` of unrelated values", most: 0, count: tuple_lets },
-    Habit { name: "closures that name one expression", most: 1127, count: closure_lets },
-    Habit { name: "tuple parameters", most: 6, count: tuple_parameters },
+    Habit { name: "closures that name one expression", most: 46, count: closure_lets },
+    Habit { name: "tuple parameters", most: 4, count: tuple_parameters },
 ];
 
 #[test]

@@ -8,7 +8,7 @@ mod mirror_cells;
 use std::ops::RangeInclusive;
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Highlight, MAX_MIRROR_CELLS};
+use depth_image::Highlight;
 use gpu::{Binding, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, shader_variant, uniform_elements};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
@@ -38,8 +38,6 @@ pub(crate) const MARCH_ROUNDS: u32 = 2;
 pub(crate) const LEAST_WAY: f32 = 1e-5;
 /// The cosine between the normals of neighbouring samples below which an edge of the mirror runs between them.
 pub(crate) const EDGE_COSINE: f32 = 0.7;
-/// Lists of rays: one for each mirror cell, and one for a base.
-pub(crate) const MAX_RAY_LISTS: usize = MAX_MIRROR_CELLS + 1;
 
 /// `MirrorBox` of `bounce/list.wgsl`.
 #[repr(C)]

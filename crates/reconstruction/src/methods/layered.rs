@@ -8,8 +8,8 @@ use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, CellRays, RayLists};
 use crate::cube::Cube;
-use crate::lobes::{self, GlossyList, LobeLight, LobeSum};
-use crate::reflectors::Reflection;
+use crate::lobes::{self, GlossyList, LobeSum};
+use crate::reflectors::{LobeLight, Reflection};
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 

@@ -88,7 +88,7 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
     let bytes = plane_bytes * (1 + batch.output.sums.visibility_words()) as u64;
     let words = pool.lend_storage("colours of layers", bytes);
     let points = Rays::of_points(gpu, &memory, count, 1);
-    let (mut recording, parts) = batch.record_points(stages, "light of layers", sums, count);
+    let (mut recording, parts) = batch.record_points(&stages.gpu, &stages.passes, "light of layers", sums, count);
     let lit = batch.work.lighting.is_lit();
     if lit {
         let sums = (*recording.sums.buffer).clone();

@@ -58,7 +58,8 @@ impl<'a> RadianceWork<'a> {
         gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
         let ends = Rays::of_points(gpu, &memory.bounces[0], count, 0);
         let no_sums = pool.lend_storage("no sums", 4);
-        let (mut recording, parts) = batch.record_points(stages, "light of a light field", no_sums, count);
+        let (mut recording, parts) =
+            batch.record_points(&stages.gpu, &stages.passes, "light of a light field", no_sums, count);
         recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
         // Whoever gathers them has met one mirror before.
         let mirrors = batch.work.lighting.reflections().saturating_sub(1);

@@ -1,16 +1,12 @@
 //! The frame of all charts: a title, a legend above the data, and ink that follows the page.
 
-use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Mark;
-use super::marker::Marker;
+use super::marker::{Area, Marker};
 use crate::ReportError;
-
-/// Part of a drawing.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Charts are drawn at this width and may be scaled.
 pub(super) const WIDTH_PX: u32 = 700;

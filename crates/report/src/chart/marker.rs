@@ -1,8 +1,10 @@
 //! Markers of points: each series has a shape as well as a colour.
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::canvas::{Area, message};
+/// Part of a drawing.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Half a marker's size in pixels.
 const RADIUS_PX: i32 = 4;
@@ -27,7 +29,7 @@ impl Marker {
             (_, true) => area.draw(&Polygon::new(corners.to_vec(), style)),
             (_, false) => area.draw(&PathElement::new([corners.as_slice(), &corners[..1]].concat(), style)),
         }
-        .map_err(message)
+        .map_err(|error| error.to_string())
     }
 
     /// Offsets from the centre. A triangle's first corner counts twice.

@@ -7,8 +7,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{self, Area, INK, LegendEntry, TEXT_SIZE, WIDTH_PX, message, text_style, text_width_px};
-use super::marker::Marker;
+use super::canvas::{self, INK, LegendEntry, TEXT_SIZE, WIDTH_PX, message, text_style, text_width_px};
+use super::marker::{Area, Marker};
 use super::ruler::Ruler;
 use super::{Axis, Limit, Mark, Palette, Point, Series};
 use crate::ReportError;

@@ -8,6 +8,7 @@ mod gltf;
 mod ktx2;
 mod normals;
 mod obj;
+mod options;
 mod picture;
 mod ply;
 mod polygons;
@@ -15,14 +16,14 @@ mod source_scene;
 mod vertex_colors;
 mod warnings;
 
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
 
 use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
 pub use environment::load_environment;
 use folder::{Folder, decoded};
+use options::Import;
+pub use options::{ImportOptions, MissingTextures, MissingTexturesError};
 use source_scene::{PlacedCamera, SourceInstance, SourceMesh, SourceScene, plain_vertex};
 use warnings::Warnings;
 
@@ -43,14 +44,6 @@ pub fn load_file(path: &Path, limits: &Limits, options: impl Into<ImportOptions>
     scene.map_err(|fault| fault.in_file(path.display().to_string()))
 }
 
-/// What the readers of all formats share: where files are, how large they may be, and where warnings go.
-pub(crate) struct Import<'a> {
-    pub folder: Folder,
-    pub limits: &'a Limits,
-    pub options: &'a ImportOptions,
-    pub warnings: Warnings,
-}
-
 fn read_source(path: &Path, limits: &Limits, options: &ImportOptions) -> Result<SourceScene, Fault> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let read: fn(&[u8], &Import) -> Result<SourceScene, Fault> = match extension.as_str() {
@@ -68,49 +61,4 @@ fn read_source(path: &Path, limits: &Limits, options: &ImportOptions) -> Result<
     import.warnings.log();
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(SourceScene { name, ..source? })
-}
-
-/// Options of [`load_file`].
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct ImportOptions {
-    /// What is done about missing textures.
-    pub missing_textures: MissingTextures,
-    /// Names of glTF extensions that a file may require although they are not read.
-    pub ignore_required: Vec<String>,
-}
-
-impl From<MissingTextures> for ImportOptions {
-    fn from(missing_textures: MissingTextures) -> Self {
-        Self { missing_textures, ..Self::default() }
-    }
-}
-
-/// What is done about missing textures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum MissingTextures {
-    /// The scene is refused, and all missing files are named.
-    #[default]
-    Refuse,
-    /// A grey texel takes the place of each.
-    Grey,
-}
-
-/// A text that names no choice.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is neither refuse nor grey")]
-pub struct MissingTexturesError(String);
-
-impl FromStr for MissingTextures {
-    type Err = MissingTexturesError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let named = [Self::Refuse, Self::Grey].into_iter().find(|choice| choice.to_string() == text);
-        named.ok_or_else(|| MissingTexturesError(text.to_owned()))
-    }
-}
-
-impl fmt::Display for MissingTextures {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if *self == Self::Refuse { "refuse" } else { "grey" })
-    }
 }

@@ -7,6 +7,7 @@ mod gallery;
 mod geometry;
 mod grass;
 mod mirror_hall;
+pub mod parts;
 mod random;
 mod snake;
 mod teapot;
@@ -21,11 +22,3 @@ pub use mirror_hall::mirror_hall;
 pub use snake::snake;
 pub use tree_terrain::tree_terrain;
 pub use urban::urban;
-
-/// What procedural scenes are made of, for the scenes of laboratory and tests in the crate `fixtures`.
-pub mod parts {
-    pub use super::geometry::{MeshBuilder, Station, ball, checked, checks, matt, mirror, star, vertex};
-    pub use super::random::{Noise, Rng, lerp, mix, mixed};
-    pub use super::teapot::{Teapot, teapot};
-    pub use super::tree::{TreePlan, tree_mesh};
-}

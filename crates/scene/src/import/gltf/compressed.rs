@@ -2,8 +2,8 @@
 //!
 //! `meshoptimizer-rs` decodes. It is a port of the reference without unsafe code, and checks every read of a stream.
 
-use gltf::json::Value;
 use gltf::json::buffer::{Buffer, View};
+use gltf::json::{Root, Value};
 use meshoptimizer_rs::codec::{
     decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer,
     decode_index_sequence, decode_vertex_buffer,
@@ -11,7 +11,7 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Error, Limits, Workspace};
 use serde::Deserialize;
 
-use super::{Document, parsed};
+use super::parsed;
 use crate::{Fault, at_most};
 
 /// The names of the extension. Their JSON is the same.
@@ -25,10 +25,12 @@ pub(super) fn is_fallback(buffer: &Buffer) -> bool {
 }
 
 /// The decoded bytes of each buffer view that is compressed. All of them together count against the limit of a file,
-/// before memory is allocated.
-pub(super) fn decode_all(document: &Document) -> Result<Vec<Option<Vec<u8>>>, Fault> {
-    let Document { root, limits, .. } = document;
-    let limit_bytes = limits.file_bytes;
+/// before memory is allocated. `range` gives a range of a buffer.
+pub(super) fn decode_all<'a>(
+    root: &Root,
+    limit_bytes: u64,
+    range: impl Fn(u64, u64, u64) -> Option<&'a [u8]>,
+) -> Result<Vec<Option<Vec<u8>>>, Fault> {
     let mut decoded_bytes = 0u64;
     let mut decoded = vec![None; root.buffer_views.len()];
     for (number, view) in root.buffer_views.iter().enumerate() {
@@ -41,7 +43,7 @@ pub(super) fn decode_all(document: &Document) -> Result<Vec<Option<Vec<u8>>>, Fa
         decoded_bytes = decoded_bytes.saturating_add(compressed.count * compressed.byte_stride);
         at_most(format_args!("{element}: decoded views in bytes"), decoded_bytes, limit_bytes)?;
         let Compressed { buffer, byte_offset, byte_length, .. } = compressed;
-        let Some(bytes) = document.buffer_range(buffer, byte_offset, byte_length) else {
+        let Some(bytes) = range(buffer, byte_offset, byte_length) else {
             return Err(Fault::malformed(element, format!("its {byte_length} bytes leave buffer {buffer}")));
         };
         let bytes = compressed.decode(bytes, limit_bytes);

@@ -53,8 +53,11 @@ impl<'a> Document<'a> {
             elements_left: Cell::new(elements),
         };
         document.read_buffers(binary_chunk)?;
-        document.decoded_views = compressed::decode_all(&document)?;
-        document.decoded_accessors = draco::decode_all(&document)?;
+        document.decoded_views = compressed::decode_all(root, limits.file_bytes, |buffer, offset, length| {
+            document.buffer_range(buffer, offset, length)
+        })?;
+        document.decoded_accessors =
+            draco::decode_all(root, limits, |view, element| Ok(document.view(view, element)?.1))?;
         Ok(document)
     }
 
@@ -93,7 +96,7 @@ impl<'a> Document<'a> {
     }
 
     /// A range of a buffer.
-    pub(super) fn buffer_range(&self, buffer: u64, offset: u64, length: u64) -> Option<&[u8]> {
+    fn buffer_range(&self, buffer: u64, offset: u64, length: u64) -> Option<&[u8]> {
         slice_of(self.buffers.get(usize::try_from(buffer).ok()?)?, offset, length)
     }
 

@@ -13,8 +13,8 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
 
-use super::{Document, parsed};
-use crate::{Fault, at_most};
+use super::parsed;
+use crate::{Fault, Limits, at_most};
 
 /// The name of the extension.
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
@@ -43,9 +43,13 @@ struct Streams {
     bytes_left: u64,
 }
 
-/// The accessors of all compressed primitives, by their numbers. All streams together count against the limits.
-pub(super) fn decode_all(document: &Document) -> Result<HashMap<usize, DecodedAccessor>, Fault> {
-    let Document { root, limits, .. } = document;
+/// The accessors of all compressed primitives, by their numbers. All streams together count against the limits. `view` gives
+/// the bytes of a buffer view.
+pub(super) fn decode_all<'a>(
+    root: &Root,
+    limits: &Limits,
+    view: impl Fn(Index<View>, &str) -> Result<&'a [u8], Fault>,
+) -> Result<HashMap<usize, DecodedAccessor>, Fault> {
     let mut streams = Streams {
         decoded: HashMap::new(),
         points_left: limits.vertices,
@@ -58,8 +62,7 @@ pub(super) fn decode_all(document: &Document) -> Result<HashMap<usize, DecodedAc
             let Some(extension) = extension.filter(|_| is_needed(root, primitive, &streams.decoded)) else { continue };
             let element = format!("mesh {number}, primitive {part}, {NAME}");
             let compressed: Compressed = parsed(extension, &element)?;
-            let (_, bytes) = document.view(compressed.buffer_view, &element)?;
-            let mesh = streams.mesh(bytes, &element)?;
+            let mesh = streams.mesh(view(compressed.buffer_view, &element)?, &element)?;
             streams.add_accessors(primitive, &compressed, &mesh, &element)?;
         }
     }

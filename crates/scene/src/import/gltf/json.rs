@@ -5,7 +5,7 @@
 use std::fmt::Display;
 use std::mem::take;
 
-use gltf::json::{Root, Value, deserialize};
+use gltf::json::{Index, Root, Scene as JsonScene, Value, deserialize};
 use serde::de::DeserializeOwned;
 
 use super::super::Warnings;
@@ -36,6 +36,11 @@ pub(super) fn parse(json: &[u8], limits: &Limits, warnings: &Warnings) -> Result
 /// Reads the JSON of an extension that the `gltf` crate leaves unparsed.
 pub(super) fn parsed<T: DeserializeOwned>(value: &Value, element: impl Display) -> Result<T, Fault> {
     deserialize::from_value(value.clone()).map_err(|e| Fault::malformed(element, e.to_string()))
+}
+
+/// The number of the default scene, or else of the first.
+pub(super) fn chosen_scene(root: &Root) -> Option<Index<JsonScene>> {
+    root.scene.or((!root.scenes.is_empty()).then(|| Index::new(0)))
 }
 
 /// Refuses other versions than 2. In version 1, which some files do not state, lists are objects.

@@ -3,14 +3,14 @@
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4};
 use std::ops::RangeInclusive;
 
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Spot, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
 
 use super::super::SourceScene;
-use super::nodes::{Place, chosen_scene};
+use super::json::chosen_scene;
 use super::{Document, parsed};
 use crate::light_rig::{SourceLight, color, color_mut, scaled};
 use crate::{Environment, Fault, Illumination, Light};
@@ -28,15 +28,15 @@ const LEAST_DISTANCE_FROM_POINT: f64 = 1e-3;
 /// Angles over 90° by less than this, radians, are 90°.
 const ANGLE_ROUNDING_RAD: f32 = 1e-3;
 
-/// The light of a node. `None` for a light of negative strength, and for one whose node has no
+/// The light of the node that `node` names in messages. `None` for a light of negative strength, and for one whose node has no
 /// direction.
 pub(super) fn placed(
     document: &Document,
     index: Index<JsonLight>,
-    place: &Place,
+    node: &str,
+    source_from_node: DAffine3,
 ) -> Result<Option<SourceLight>, Fault> {
-    let source_from_node = place.source_from_node;
-    let json = document.root.get(index).ok_or_else(|| Fault::malformed(&place.element, "its light does not exist"))?;
+    let json = document.root.get(index).ok_or_else(|| Fault::malformed(node, "its light does not exist"))?;
     let element = format!("light {}", index.value());
     let left_out = |reason: &str| {
         let name = json.name.as_deref().unwrap_or("no name");

@@ -2,17 +2,16 @@
 
 use glam::{Vec3, Vec4};
 use gltf::json::material::{AlphaMode, Material as JsonMaterial};
-use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
-use serde::Deserialize;
 
 use super::super::SourceScene;
 use super::super::picture::decode_all;
+use super::Document;
+use super::specular_glossiness::SpecularGlossiness;
 use super::texture_coordinates::Coordinates;
 use super::textures::{
     BASE_COLOR, EMISSIVE, METALLIC_ROUGHNESS, Means, NORMAL, OCCLUSION, Pictures, Uses, number_shown,
 };
-use super::{Document, parsed};
 use crate::{DIELECTRIC_REFLECTANCE, Fault, Material};
 
 /// Fills the scene's materials, one more than the file's (its default), and its textures. Returns the coordinates that the
@@ -187,30 +186,5 @@ impl MaterialReader<'_> {
             *value = self.clamped(name, *value, most)?;
         }
         Ok(values)
-    }
-}
-
-/// The JSON of `KHR_materials_pbrSpecularGlossiness`, the older description of a surface. Factors that are not there are 1.
-///
-/// A surface without metal has the same two parts in both descriptions: a diffuse colour, and a reflectance at normal
-/// incidence of any colour. The texture of specular colour and glossiness counts by its mean.
-#[derive(Default, Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-pub(super) struct SpecularGlossiness {
-    pub diffuse_factor: Option<[f32; 4]>,
-    pub diffuse_texture: Option<Info>,
-    pub specular_factor: Option<[f32; 3]>,
-    pub glossiness_factor: Option<f32>,
-    pub specular_glossiness_texture: Option<Info>,
-}
-
-impl SpecularGlossiness {
-    /// The description of a material; `None` where it has none, or has the newer one with a texture of its own.
-    pub(super) fn of(material: &JsonMaterial, element: &str) -> Result<Option<Self>, Fault> {
-        const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
-        let extension = material.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
-        let has_newer = material.pbr_metallic_roughness.metallic_roughness_texture.is_some();
-        let Some(extension) = extension.filter(|_| !has_newer) else { return Ok(None) };
-        parsed(extension, format_args!("{element}: {NAME}")).map(Some)
     }
 }

@@ -28,6 +28,7 @@ mod materials;
 mod meshes;
 mod nodes;
 mod primitives;
+mod specular_glossiness;
 mod texture_coordinates;
 mod textures;
 
@@ -58,7 +59,7 @@ pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> 
     let tree = nodes::read(&document, &meshes, &mut scene)?;
     animation::read(&document, &tree, &mut scene)?;
     if scene.instances.is_empty() {
-        let number = nodes::chosen_scene(&root).map_or(0, |scene| scene.value());
+        let number = json::chosen_scene(&root).map_or(0, |scene| scene.value());
         return Err(Fault::malformed("scene", format!("it has no triangles in scene {number}")));
     }
     if !lights::read_extension(&root, &mut scene)? {

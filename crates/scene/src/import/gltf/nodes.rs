@@ -9,6 +9,7 @@ use gltf::json::{Index, Node, Root, Scene as JsonScene};
 use serde::Deserialize;
 
 use super::super::{PlacedCamera, SourceInstance, SourceScene};
+use super::json::chosen_scene;
 use super::meshes::Meshes;
 use super::{Document, lights, parsed};
 use crate::{Fault, TransformParts, at_most, is_invertible};
@@ -34,7 +35,7 @@ pub(super) fn read(document: &Document, meshes: &Meshes, scene: &mut SourceScene
         if is_visible {
             place_mesh(document, meshes, node, &place, scene, &mut tree)?;
             if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
-                scene.lights.extend(lights::placed(document, light.light, &place)?);
+                scene.lights.extend(lights::placed(document, light.light, &place.element, source_from_node)?);
             }
         }
         if node.camera.is_some() {
@@ -89,11 +90,6 @@ pub(super) struct PlacedNode {
     pub source_from_node: DAffine3,
 }
 
-/// The number of the default scene, or else of the first.
-pub(super) fn chosen_scene(root: &Root) -> Option<Index<JsonScene>> {
-    root.scene.or((!root.scenes.is_empty()).then(|| Index::new(0)))
-}
-
 fn roots(root: &Root) -> Result<Vec<Index<Node>>, Fault> {
     if let Some(index) = chosen_scene(root) {
         let scene: Option<&JsonScene> = root.get(index);
@@ -111,9 +107,9 @@ fn is_hidden(node: &Node) -> bool {
 }
 
 /// A node's name in messages, and its transform.
-pub(super) struct Place {
-    pub element: String,
-    pub source_from_node: DAffine3,
+struct Place {
+    element: String,
+    source_from_node: DAffine3,
 }
 
 fn place_mesh(

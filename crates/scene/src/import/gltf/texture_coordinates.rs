@@ -7,8 +7,8 @@ use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::{Info, Texture as JsonTexture};
 use gltf::json::{Index, Value};
 
-use super::materials::SpecularGlossiness;
 use super::parsed;
+use super::specular_glossiness::SpecularGlossiness;
 use crate::Fault;
 
 const TRANSFORM: &str = "KHR_texture_transform";

@@ -13,7 +13,7 @@ use gltf::json::{Index, Root};
 
 use super::super::picture::{Content, EncodedPicture};
 use super::Document;
-use super::materials::SpecularGlossiness;
+use super::specular_glossiness::SpecularGlossiness;
 use super::texture_coordinates::{Coordinates, maps_of};
 use crate::{Fault, Texture, TextureUse, Wrap, at_most};
 

@@ -3,17 +3,14 @@
 
 mod art;
 mod furniture;
+mod size;
 
 use depth_image::{Environment, Illumination, Light};
 use glam::{Affine3A, Mat3, Vec3};
 
 use super::parts::{MeshBuilder, Rng, matt};
 use crate::{Material, Scene, SourceCamera};
-
-/// From the middle of the floor to the walls, and the height, in metres.
-const HALF_LENGTH_M: f32 = 6.0;
-const HALF_WIDTH_M: f32 = 4.0;
-const HEIGHT_M: f32 = 4.2;
+use size::{HALF_LENGTH_M, HALF_WIDTH_M, HEIGHT_M};
 
 const PLANK_M: [f32; 2] = [1.5, 0.2];
 const WINDOW_MIDDLES_M: [f32; 4] = [-4.3, -1.45, 1.4, 4.25];

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use glam::Vec3;
 
 use super::super::parts::{MeshBuilder, Noise, mix, vertex};
-use super::{Branch, LEVELS, Skeleton};
+use super::skeleton::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 
 /// Rings along and sides around a branch of each level, at detail 1.

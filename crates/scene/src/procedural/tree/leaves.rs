@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::super::parts::{MeshBuilder, Noise, Rng, lerp, mix, vertex};
-use super::{Branch, LEVELS, Skeleton};
+use super::skeleton::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 
 /// Area of one side of all leaves, for a tree of this size: about four layers over the crown.
