@@ -274,11 +274,10 @@ impl Sets {
         }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
         match load().await {
-            Err(status)
-                if status.code() == Code::FailedPrecondition
-                    && self.node.plans.require(plan.workload_number, plan.plan_epoch).is_ok() =>
-            {
-                load().await
+            Err(status) if status.code() == Code::FailedPrecondition => {
+                let in_force = self.node.plans.in_force(plan.workload_number);
+                let is_in_force = in_force.is_some_and(|in_force| in_force.plan_epoch == plan.plan_epoch);
+                if is_in_force { load().await } else { Err(status) }
             }
             loaded => loaded,
         }

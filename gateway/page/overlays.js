@@ -3,6 +3,15 @@
 import { $, element, on, press, say, tell } from "./dom.js";
 import { Newest, queryOf, request } from "./api.js";
 
+/** The entries of a legend's header: [text, colour]; none where the header is missing or broken. */
+function legendOf(header) {
+  try {
+    return JSON.parse(header ?? "[]").filter(([text, color]) => typeof text === "string" && /^#[0-9a-f]{6}$/i.test(color));
+  } catch {
+    return [];
+  }
+}
+
 const NAMES = { provenance: "Provenance", depth: "Depth" };
 
 export class Overlays {
@@ -62,7 +71,7 @@ export class Overlays {
 
   async load(view, kind, signal) {
     const answer = await request("view.png", queryOf(view, { show: kind }), signal);
-    const legend = JSON.parse(answer.headers.get("Myriorama-Legend") ?? "[]");
+    const legend = legendOf(answer.headers.get("Myriorama-Legend"));
     const url = URL.createObjectURL(await answer.blob());
     const image = new Image();
     image.src = url;

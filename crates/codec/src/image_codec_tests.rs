@@ -412,7 +412,8 @@ fn a_camera_of_another_size_than_the_image_is_refused() {
 
 #[test]
 fn a_small_payload_claims_no_large_buffer() {
-    let mut bad = encode_depth_image(&image(200, 200)).expect("consistent planes");
+    let two_planes = DepthImage { normal_oct16: None, surface_id: None, ..image(200, 200) };
+    let mut bad = encode_depth_image(&two_planes).expect("consistent planes");
     bad.header.planes[0].packed_bytes = 2;
     bad.header.planes[1].packed_bytes = 2;
     bad.payload = Bytes::from_static(&[0xff, 0xff, 0xff, 0xff]);

@@ -92,6 +92,16 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn the_whole_box_is_in_view() {
+        for max in [Vec3::splat(2.0), Vec3::new(40.0, 1.0, 3.0), Vec3::new(1.0, 90.0, 1.0)] {
+            let volume = Aabb { min: -Vec3::ONE, max };
+            let view = view_from_outside(&volume, UVec2::splat(64));
+            let is_seen = |corner| view.project(corner).is_some_and(|at| view.contains(at.pixel));
+            assert!(view.validate().is_ok() && volume.corners().into_iter().all(is_seen), "{max}");
+        }
+    }
+
     /// What 8 bits show of surfaces that send this much light.
     fn seen(light: f32, exposure: ExposureEv) -> f32 {
         linear_from_srgb8(srgb8_from_linear(light * exposure.factor()))

@@ -271,3 +271,15 @@ fn a_field_out_of_place_is_seen() {
     let other = parsed("struct PixelList { count: u32, workgroups: array<u32, 3> }");
     assert_ne!(shader(&other, "PixelList"), host!(GpuPixelList { workgroups, count }));
 }
+
+#[test]
+fn the_uniform_with_a_dynamic_offset_is_declared() {
+    for name in crate::view_work::ONE_VIEW {
+        let variable =
+            |module: &Module| module.global_variables.iter().any(|(_, found)| found.name.as_deref() == Some(*name));
+        assert!(
+            modules_with("GpuViewWork").chain(modules_with("ViewWork")).any(|(_, module)| variable(module)),
+            "{name}"
+        );
+    }
+}

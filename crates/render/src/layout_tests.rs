@@ -1,5 +1,6 @@
 //! Structs shared with the shader have the shader's layout: naga's offsets against Rust's.
 
+use std::collections::BTreeSet;
 use std::mem::offset_of;
 
 use bytemuck::Zeroable as _;
@@ -258,6 +259,8 @@ const BOUND: &[&str] = &[
     "held",
     "illumination",
     "kept",
+    "known_cameras",
+    "known_samples",
     "list",
     "listed_pixels",
     "lobe",
@@ -265,6 +268,8 @@ const BOUND: &[&str] = &[
     "next",
     "next_bounces",
     "position_sums",
+    "reference_camera",
+    "reference_samples",
     "reflected",
     "reversed_depth",
     "samples",
@@ -281,12 +286,17 @@ const BOUND: &[&str] = &[
 #[test]
 fn every_variable_of_a_pass_has_a_resource() {
     let templates = test_templates();
-    let sources = crate::shader_sources(&templates, &[]).map(|source| source.expect("a text"));
-    for source in sources.filter(|source| source.template != "raster.wgsl") {
-        let declared = source.wgsl.lines().filter_map(|line| line.trim().strip_prefix("@group("));
-        for line in declared {
+    let mut declared = BTreeSet::new();
+    for source in crate::shader_sources(&templates, &[TEST]) {
+        let source = source.expect("a text");
+        for line in source.wgsl.lines().filter_map(|line| line.trim().strip_prefix("@group(")) {
             let name = line.split(':').next().and_then(|named| named.rsplit(' ').next()).unwrap_or_default();
-            assert!(BOUND.contains(&name), "{}: {line}", source.name);
+            let is_bound = source.template == "raster.wgsl" || BOUND.contains(&name);
+            assert!(is_bound, "{}: {line}", source.name);
+            declared.insert(name.to_owned());
         }
+    }
+    for name in crate::shaders::TRAITS {
+        assert!(declared.contains(*name), "no shader declares {name}, which has a dynamic offset");
     }
 }

@@ -37,7 +37,7 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
 };
 
 /// Cameras and objects have an element for each dispatch or draw.
-const TRAITS: ResourceTraits = &["camera", "object"];
+pub(crate) const TRAITS: ResourceTraits = &["camera", "object"];
 
 /// [`SHADERS`] and templates of redundancy tests, each with its name.
 ///

@@ -93,7 +93,7 @@ impl Surfaces {
         Self { surface_ids: own_ids.or(views.surface_ids.as_ref()).cloned(), views }
     }
 
-    /// The variables of `surfaces.wgsl`.
+    /// All textures; each shader declares some of them.
     pub fn bindings(&self) -> impl Iterator<Item = Binding<'_>> {
         let SurfaceViews { surfaces, reversed_depth, front_depth, triangle_normals, first_surfaces, .. } = &*self.views;
         let always = [("surfaces", surfaces), ("reversed_depth", reversed_depth), ("front_depth", front_depth)];

@@ -31,28 +31,31 @@ impl MovingInstance {
     /// Every coordinate is finite and at most [`MAX_COORDINATE_M`].
     #[must_use]
     pub fn posed(&self, rest: &[Vertex], world_from_nodes: &[DAffine3]) -> Vec<Vertex> {
-        self.moved(rest, world_from_nodes, placed)
+        self.moved(rest, world_from_nodes, Placement::from, placed)
     }
 
     /// As [`Self::posed`], the details of vertices: tangents turn.
     #[must_use]
     pub fn posed_details(&self, rest: &[VertexDetail], world_from_nodes: &[DAffine3]) -> Vec<VertexDetail> {
-        self.moved(rest, world_from_nodes, turned)
+        self.moved(rest, world_from_nodes, Affine3A::from, turned)
     }
 
-    fn moved<T: Copy + Send + Sync>(
+    /// `prepared` gives what all items with one placement share.
+    fn moved<T: Copy + Send + Sync, P: Sync>(
         &self,
         rest: &[T],
         world_from_nodes: &[DAffine3],
-        moved: fn(&Affine3A, &T) -> T,
+        prepared: fn(Affine3A) -> P,
+        moved: fn(&P, &T) -> T,
     ) -> Vec<T> {
         let world_from_mesh = self.world_from_mesh(world_from_nodes);
         let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
         if self.influences.is_empty() {
-            return rest.par_iter().map(|item| moved(first, item)).collect();
+            let first = prepared(*first);
+            return rest.par_iter().map(|item| moved(&first, item)).collect();
         }
         let influenced = rest.par_iter().zip(&self.influences);
-        influenced.map(|(item, influence)| moved(&blended(&world_from_mesh, influence), item)).collect()
+        influenced.map(|(item, influence)| moved(&prepared(blended(&world_from_mesh, influence)), item)).collect()
     }
 
     /// The mesh's placement in the world by each joint.
@@ -63,6 +66,18 @@ impl MovingInstance {
             Affine3A::from_cols_array(&world_from_mesh.to_cols_array().map(bounded))
         });
         world_from_joints.collect()
+    }
+}
+
+/// A placement of vertices, and of their normals.
+struct Placement {
+    world_from_mesh: Affine3A,
+    normals: Mat3A,
+}
+
+impl From<Affine3A> for Placement {
+    fn from(world_from_mesh: Affine3A) -> Self {
+        Self { world_from_mesh, normals: normals_from(world_from_mesh.matrix3) }
     }
 }
 
@@ -83,11 +98,9 @@ fn blended(world_from_mesh: &[Affine3A], influence: &Influence) -> Affine3A {
     })
 }
 
-fn placed(world_from_mesh: &Affine3A, vertex: &Vertex) -> Vertex {
-    let point = world_from_mesh.transform_point3a(Vec3A::from(vertex.position)).to_array();
-    let normal = (normals_from(world_from_mesh.matrix3) * Vec3A::from(vertex.normal))
-        .try_normalize()
-        .map_or(Vec3::Y, Vec3::from);
+fn placed(placement: &Placement, vertex: &Vertex) -> Vertex {
+    let point = placement.world_from_mesh.transform_point3a(Vec3A::from(vertex.position)).to_array();
+    let normal = (placement.normals * Vec3A::from(vertex.normal)).try_normalize().map_or(Vec3::Y, Vec3::from);
     Vertex { position: point.map(|c| bounded(c.into())), normal: normal.to_array(), ..*vertex }
 }
 

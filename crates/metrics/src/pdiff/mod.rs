@@ -33,8 +33,8 @@ const GAMMA: f32 = 2.2;
 /// The luminance of white.
 const WHITE_CD_M2: f32 = 100.0;
 
-/// Yee's perceptual difference: whether a viewer sees a pixel differ, for each pixel, row by row. The channels have the primaries of Adobe RGB (1998), as the public tool assumes; they weigh
-/// chroma a little more than those of sRGB.
+/// Yee's perceptual difference: whether a viewer sees a pixel differ, for each pixel, row by row. The channels have the
+/// primaries of Adobe RGB (1998), as the public tool assumes; they weigh chroma a little more than those of sRGB.
 ///
 /// # Errors
 /// Images differ in size.

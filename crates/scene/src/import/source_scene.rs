@@ -8,7 +8,7 @@ use glam::{Affine3A, BVec3, DAffine3, DVec3};
 use crate::light_rig::{DEFAULT_BACKGROUND, SourceLight};
 use crate::{
     Animation, Environment, Fault, Illumination, Influence, Instance, Limits, Material, Mesh, MeshPart, MovingInstance,
-    Scene, SourceCamera, SourceSpace, Texture, Vertex, VertexDetail,
+    Scene, SourceCamera, SourceSpace, Texture, Vertex, VertexDetail, at_most,
 };
 
 /// The result of an importer.
@@ -62,6 +62,9 @@ pub(crate) fn plain_vertex() -> Vertex {
 impl SourceScene {
     /// Checks, re-centres, un-mirrors, converts to `f32`, and validates.
     pub(crate) fn finish(mut self, limits: &Limits) -> Result<Scene, Fault> {
+        at_most("instances", self.instances.len() as u64, limits.instances)?;
+        let triangles = self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() as u64 / 3);
+        at_most("triangles of all instances", triangles.fold(0, u64::saturating_add), limits.triangles)?;
         self.normalise_meshes()?;
         let source_space = source_space(self.bounds_in_source(), self.animation.is_some())?;
         self.unmirror();

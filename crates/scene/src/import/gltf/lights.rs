@@ -13,7 +13,7 @@ use super::super::SourceScene;
 use super::json::chosen_scene;
 use super::{Document, parsed};
 use crate::light_rig::{SourceLight, color, color_mut, scaled};
-use crate::{Environment, Fault, Illumination, Light};
+use crate::{Environment, Fault, Illumination, Light, LightError};
 
 /// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
 /// white.
@@ -49,6 +49,9 @@ pub(super) fn placed(
     if json.intensity < 0.0 || json.color.iter().any(|channel| *channel < 0.0) {
         return left_out("of negative strength");
     }
+    if !Vec3::from(json.color).is_finite() {
+        return Err(Fault::light(&element, &LightError { field: "color", reason: "not finite" }));
+    }
     // From lux and candela: a white surface reflects 1/π of them into each direction.
     let color = Vec3::from(json.color) * json.intensity * FRAC_1_PI;
     let backwards = (source_from_node.matrix3 * DVec3::Z).try_normalize().map(|v| v.as_vec3());
@@ -74,7 +77,15 @@ pub(super) fn placed(
             }
         }
     };
-    light.validate().map_err(|e| Fault::light(&element, &e))?;
+    light.validate().map_err(|LightError { field, reason }| {
+        let field = match field {
+            "irradiance" => "intensity",
+            "outer_cone" => "spot.outerConeAngle",
+            "inner_cone" => "spot.innerConeAngle",
+            other => other,
+        };
+        Fault::light(&element, &LightError { field, reason })
+    })?;
     Ok(Some(SourceLight { light, position_in_source: source_from_node.translation }))
 }
 
