@@ -110,8 +110,8 @@ pub(crate) struct SessionState {
     pub(crate) active: Arc<ActivePlan>,
 }
 
-/// The first thing that is found in a session's state as it changes. Nothing follows once the session has ended, which is
-/// waited for for ever.
+/// Waits until `find` finds something in a session's state. Nothing follows once the session has ended: the wait then never
+/// ends.
 pub(crate) async fn first_in<T>(
     mut state: watch::Receiver<SessionState>,
     find: impl Fn(&SessionState) -> Option<T>,

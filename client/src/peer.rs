@@ -77,7 +77,7 @@ impl Failure {
         Self::OfPlan(error)
     }
 
-    /// What the peer sent, or did not send, is at fault.
+    /// The failure of a peer that sent something wrong, or nothing in time.
     fn of_fault(peer: &Peer, fault: impl ToString) -> Self {
         Self::of_peer(peer, peer.error(fault))
     }

@@ -57,7 +57,7 @@ pub(crate) struct Tried {
     pub(crate) plan_epoch: u64,
     names: HashSet<String>,
     pub(crate) last: Option<ClientError>,
-    /// One of them failed for another reason than that it had no room.
+    /// Whether a compositor failed for another reason than a lack of room.
     pub(crate) has_failed_with_room: bool,
 }
 

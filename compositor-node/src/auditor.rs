@@ -27,8 +27,8 @@ pub(crate) struct Auditor {
     pub(crate) choice: Mutex<AuditChoice>,
 }
 
-/// A view that was chosen.
-struct Chosen {
+/// A view that is to be audited.
+struct ChosenView {
     plan: Arc<Assignment>,
     set: Pinned<ReadySet>,
     view: Candidate,
@@ -58,7 +58,7 @@ impl Auditor {
     }
 
     /// The views are of one set, as views that are made together are.
-    fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<Chosen> {
+    fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<ChosenView> {
         let first = covered.first()?;
         let Source::Sets(ViewSets { of_cell: set, .. }) = &first.set.source else { return None };
         let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
@@ -70,10 +70,10 @@ impl Auditor {
         let candidates: Vec<Candidate> = candidates.collect();
         let mut choice = self.choice.lock();
         let place = choice.choose(Instant::now(), &kind_of(plan), &candidates, order.least_apart_m as f32)?;
-        Some(Chosen { plan: plan.clone(), set: set.clone(), view: candidates[place], scene_time_s })
+        Some(ChosenView { plan: plan.clone(), set: set.clone(), view: candidates[place], scene_time_s })
     }
 
-    async fn audit(self: Arc<Self>, chosen: Chosen, order: AuditOrder) {
+    async fn audit(self: Arc<Self>, chosen: ChosenView, order: AuditOrder) {
         let Candidate { stream, random, camera, .. } = chosen.view;
         let Assignment { plan_epoch, workload_number, .. } = *chosen.plan;
         let kind = kind_of(&chosen.plan);
@@ -106,11 +106,11 @@ impl Auditor {
 
     async fn compare(
         self: Arc<Self>,
-        chosen: Chosen,
+        chosen: ChosenView,
         order: AuditOrder,
         part: ViewPart,
     ) -> Result<(ViewErrors, f64), Status> {
-        let Chosen { plan, set, view: Candidate { camera, .. }, scene_time_s } = chosen;
+        let ChosenView { plan, set, view: Candidate { camera, .. }, scene_time_s } = chosen;
         let scene = &plan.workload.scene;
         if !self.node.engine.has_scene(scene.hash.as_str()) {
             // Loading may take minutes: the set is not kept for it.

@@ -107,11 +107,10 @@ impl Fetcher {
     /// may be lost without a word. A set outlives every other plan.
     async fn in_vain(&self, set: &SetRequest, content: &SetContent, share: &SamplerShare) {
         let ends = self.plans.until(set.plan.workload_number, |plan| {
-            plan.is_none_or(|plan| {
-                let samples = plan.samplers.iter().any(|sampler| sampler.node_name == share.node_name);
-                plan.plan_epoch != set.plan.plan_epoch
-                    && !((plan.composites(&share.node_name) || samples) && has_set(plan, content, set.set_index))
-            })
+            let Some(plan) = plan else { return true };
+            let samples = plan.samplers.iter().any(|sampler| sampler.node_name == share.node_name);
+            plan.plan_epoch != set.plan.plan_epoch
+                && !((plan.composites(&share.node_name) || samples) && has_set(plan, content, set.set_index))
         });
         ends.await;
     }

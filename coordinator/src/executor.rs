@@ -20,7 +20,8 @@ const READY_WITHIN: Duration = Duration::from_secs(300);
 const SOON: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
 /// The codes of calls whose connection broke.
-const BROKEN: [Code; 5] = [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss];
+const BROKEN_CONNECTION: [Code; 5] =
+    [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss];
 
 /// Runs until it is aborted. Plans do not wait for one another: nodes refuse a plan that a later one has replaced.
 pub(crate) async fn execute(shared: Arc<Shared>) {
@@ -127,7 +128,7 @@ async fn call(shared: &Shared, assignment: &Assignment, address: &str) -> Result
     };
     let start = Instant::now();
     match apply().await {
-        Err(status) if BROKEN.contains(&status.code()) && start.elapsed() < SOON => {
+        Err(status) if BROKEN_CONNECTION.contains(&status.code()) && start.elapsed() < SOON => {
             tokio::time::sleep(PAUSE).await;
             apply().await
         }

@@ -30,7 +30,7 @@ export class Newest {
     this.controller?.abort();
   }
 
-  /** Cancels the request before, and makes `request(signal)`. One of the others hears of it, unless it is cancelled, too. */
+  /** Cancels the request before, and makes `request(signal)`. Its end calls `answered` or `failed`, unless it is cancelled, too. */
   async ask(request, answered, failed) {
     this.cancel();
     const { signal } = (this.controller = new AbortController());

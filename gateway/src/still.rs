@@ -52,7 +52,7 @@ pub(crate) struct Still {
     pub(crate) made_s: f64,
 }
 
-/// What the stills of a visitor may be.
+/// The limits of a visitor's stills.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stills {
     /// The quality of shared light that the visitor wants.

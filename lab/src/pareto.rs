@@ -22,7 +22,6 @@ impl Better {
 }
 
 /// Points that no other point beats, by x from the best. The first of equal points stays.
-#[must_use]
 pub fn pareto_front<'a>(
     points: impl IntoIterator<Item = &'a Point>,
     [x_better, y_better]: [Better; 2],

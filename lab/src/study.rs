@@ -2,7 +2,6 @@
 //!
 //! A study is a list of rows and a function that measures one. What it reports of a row is a list of [`Column`]s.
 
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -66,7 +65,7 @@ impl RunArgs {
         self.write(usual_folder, report)
     }
 
-    /// As [`Self::finish`], without the tables.
+    /// Writes the report as [`Self::finish`] does, and prints no tables.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -95,15 +94,6 @@ pub fn check_if_measured(
         Some(value) => Check::new(name, value, unit, bar),
         None => Check::not_run(name, unit, bar, reason),
     }
-}
-
-/// Parses a number within a range, for an option.
-///
-/// # Errors
-/// The text is no such number; the message states the range.
-pub fn number_within(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| range.contains(number));
-    number.ok_or_else(|| format!("expected {} to {}", range.start(), range.end()))
 }
 
 impl<R> Column<R> {

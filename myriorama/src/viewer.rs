@@ -56,8 +56,8 @@ impl ViewerArgs {
         (Port { listener, browsers: Some(send) }, Some(browsers))
     }
 
-    /// Serves these browsers from the coordinator at this address until `shutdown`, and prints the link. The visits are the task
-    /// that is returned.
+    /// Serves these browsers from the coordinator at this address until `shutdown`, and prints the link. Returns the task that
+    /// serves them; none without browsers.
     pub fn serve(&self, browsers: Option<Connections>, coordinator: &str, shutdown: CancellationToken) -> JoinSet<()> {
         let mut visits = JoinSet::new();
         let Some(browsers) = browsers else { return visits };

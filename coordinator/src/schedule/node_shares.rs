@@ -249,8 +249,8 @@ impl NodeShares {
         true
     }
 
-    /// What those that a node serves would lose with it; `None` where the receiver cannot take the node. `own` has the number of
-    /// each workload's own nodes, `counts` the even one.
+    /// The loss of the workloads that a node serves, if the receiver takes it; `None` where the receiver cannot. `own` has the
+    /// number of each workload's own nodes, `counts` the even one.
     fn loss_of(&self, node: usize, receiver: usize, own: &[usize], counts: &[usize]) -> Option<Loss> {
         if !self.claims[receiver].ties[node].is_usable || self.is_own(receiver, node) {
             return None;

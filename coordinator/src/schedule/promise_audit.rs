@@ -142,7 +142,7 @@ impl PromiseAudit {
         }
     }
 
-    /// What audits find in words: a mean error, or a share of views.
+    /// A ratio that audits find, in words: a mean error, or a share of views.
     fn shown_audited(&self, ratio: f64) -> String {
         match self.term.statistic() {
             Statistic::Mean => self.term.shown(ratio),

@@ -54,7 +54,7 @@ pub struct Scheduler {
     resumed_at: Option<Duration>,
 }
 
-/// Limits that hold unless an event says otherwise.
+/// Limits that [`Event::Limits`] may change.
 #[derive(Debug, Clone)]
 struct Limits {
     max_workloads: usize,

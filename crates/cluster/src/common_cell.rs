@@ -30,10 +30,9 @@ impl CommonCell {
     /// # Errors
     /// For too many mirrors or bases, and values that no peer may send.
     pub(crate) fn check_all(cells: &[Self]) -> Result<(), InvalidField> {
-        let (mirrors, bases): (Vec<&Self>, Vec<&Self>) =
-            cells.iter().partition(|cell| cell.kind == CommonKind::Mirrors);
-        at_most(mirrors.len(), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
-        at_most(bases.len(), 1, "common_cells of a base")?;
+        let mirrors = cells.iter().filter(|cell| cell.kind == CommonKind::Mirrors).count();
+        at_most(mirrors, MAX_MIRROR_CELLS, "common_cells of mirrors")?;
+        at_most(cells.len() - mirrors, 1, "common_cells of a base")?;
         for Self { bounds, sampling, .. } in cells {
             nonempty(sampling, "common_cells.sampling_method")?;
             if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {

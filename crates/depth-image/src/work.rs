@@ -76,3 +76,20 @@ impl Refinement {
         self.step + 1 < self.steps
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_step_doubles_the_rays_and_the_last_has_all() {
+        let counts = |rays: u32, steps: u32| -> Vec<u32> {
+            (0..steps).map(|step| Refinement { step, steps }.share_of(rays)).collect()
+        };
+        assert_eq!(counts(16, 5), [1, 2, 4, 8, 16]);
+        assert_eq!(counts(1, 5), [1, 1, 1, 1, 1]);
+        assert_eq!(counts(12, 3), [3, 6, 12]);
+        assert_eq!(counts(0, 2), [0, 0]);
+        assert_eq!(Refinement::default().share_of(7), 7);
+    }
+}

@@ -79,7 +79,7 @@ struct UploadedImages {
 impl UploadedSet for UploadedImages {}
 impl UploadedSet for UploadedLight {}
 
-/// The images of a set of images.
+/// The images of a set; fails for samples of light, and for a set of another device.
 fn images(set: &dyn UploadedSet) -> Result<&UploadedImages, EngineError> {
     if (set as &dyn Any).is::<UploadedLight>() {
         let reason = "views that take light from samples have neither mirror cells nor a base; leave out --base";

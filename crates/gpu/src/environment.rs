@@ -11,7 +11,7 @@ const TABLES: [&str; 3] = ["environment_texels", "environment_lobes", "bright_te
 
 /// The map, its means over lobes, and its bright texels.
 pub struct GpuEnvironment {
-    /// Of the variables [`TABLES`].
+    /// One for each of the variables [`TABLES`].
     tables: [Table; 3],
     /// Bright texels are traced like a lamp.
     pub has_bright_texels: bool,

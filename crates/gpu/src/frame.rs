@@ -132,7 +132,7 @@ impl<'g> Frame<'g> {
         self.submit_in(None)
     }
 
-    /// Sends the work to the device as [`Frame::submit`] does, the first slice in a slot that was waited for before.
+    /// Sends the work to the device as [`Frame::submit`] does, the first slice in `slot` if that was waited for before.
     pub(crate) fn submit_in(self, slot: Option<Slot<'g>>) -> Result<Submitted<'g>, GpuError> {
         let Self { gpu, label, turn, mut encoder, work, ended: mut pieces, timer, reads } = self;
         if let Some(timer) = &timer {

@@ -28,7 +28,7 @@ pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{background_bytes, highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
-    Binding, BoundGroup, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTraits,
+    Binding, BoundGroup, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, DynamicUniforms, Pass, PassCache,
     Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources, switches,
     uniform_elements, uniform_stride,
 };

@@ -55,15 +55,9 @@ impl Default for Telemetry {
 
 impl Telemetry {
     /// Registers a metric, in a unit where there is one.
-    pub fn registered<M: Metric + Clone, const UNITS: usize>(
-        &self,
-        name: &str,
-        help: &str,
-        unit: [Unit; UNITS],
-        metric: M,
-    ) -> M {
+    pub fn registered<M: Metric + Clone>(&self, name: &str, help: &str, unit: Option<Unit>, metric: M) -> M {
         let mut registry = self.0.lock();
-        match unit.into_iter().next() {
+        match unit {
             Some(unit) => registry.register_with_unit(name, help, unit, metric.clone()),
             None => registry.register(name, help, metric.clone()),
         }
@@ -97,12 +91,14 @@ pub struct Reason {
     pub reason: &'static str,
 }
 
-/// Metrics of a process and their registration, from one list of `field: type, "name" in Unit, "help";`. Other fields, which
-/// are not registered, follow `beside`.
+/// Metrics of a process and their registration, from one list of `field: type = zero, "name" in Unit, "help";`, where `= zero`
+/// and `in Unit` may be left out. One more field, which is not registered, follows `beside`.
 #[macro_export]
 macro_rules! metrics {
     (@zero) => { Default::default() };
     (@zero $zero:expr) => { $zero };
+    (@unit) => { None };
+    (@unit $unit:ident) => { Some(Unit::$unit) };
     (
         $(#[$about:meta])*
         pub struct $metrics:ident {
@@ -126,7 +122,12 @@ macro_rules! metrics {
             #[must_use]
             pub fn new(telemetry: &$crate::Telemetry) -> Self {
                 Self {
-                    $($field: telemetry.registered($name, $help, [$(Unit::$unit)?], $crate::metrics!(@zero $($zero)?)),)+
+                    $($field: telemetry.registered(
+                        $name,
+                        $help,
+                        $crate::metrics!(@unit $($unit)?),
+                        $crate::metrics!(@zero $($zero)?),
+                    ),)+
                     $other: Default::default(),
                 }
             }

@@ -1,6 +1,6 @@
 //! The colour that a pixel shows: the mean over its positions in linear light, as sRGB.
 
-use gpu::{ResourceTraits, ShaderVariant, switches};
+use gpu::{DynamicUniforms, ShaderVariant, switches};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -31,7 +31,7 @@ pub(crate) struct Shown {
 
 impl ShaderVariant for Shown {
     const TEMPLATE: &'static str = "antialias.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         let sums = format!("{:?}", self.sums);

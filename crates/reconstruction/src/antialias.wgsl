@@ -27,7 +27,6 @@ fn shown_linear(index: u32, place: vec2u) -> vec3f {
     return linear;
 }
 
-
 @compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
 {% include "at_pixel.wgsl" %}

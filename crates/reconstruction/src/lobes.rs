@@ -1,7 +1,7 @@
 //! Rays into the lobes of the rough surfaces that a view shows: each surface is listed once, and sends one ray after another.
 
 use bytemuck::{Pod, Zeroable};
-use gpu::{Binding, ResourceTraits, ShaderVariant, shader_variant};
+use gpu::{Binding, ShaderVariant, shader_variant};
 use minijinja::Value;
 use wgpu::{Buffer, BufferUsages};
 
@@ -62,7 +62,6 @@ pub(crate) struct Lobe;
 
 impl ShaderVariant for Lobe {
     const TEMPLATE: &'static str = "bounce/lobe.wgsl";
-    const TRAITS: ResourceTraits = &[];
 
     fn context(&self) -> Value {
         Reflection { mirror_cells: Some(1), ..Reflection::default() }.context(SetVariant::CUBE)

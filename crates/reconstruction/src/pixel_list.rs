@@ -35,7 +35,7 @@ impl PixelList {
         Self { pixels, lists: empty_lists(gpu, "lists of undecided pixels", pieces) }
     }
 
-    /// As a pass writes it: `found.wgsl`.
+    /// The list for passes that write it: `found.wgsl`.
     pub fn written_bindings(&self) -> [Binding<'_>; 2] {
         [Binding::buffer("undecided_pixels", &self.pixels), Binding::buffer("undecided", &self.lists)]
     }

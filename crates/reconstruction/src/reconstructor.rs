@@ -148,7 +148,7 @@ impl Reconstructor {
         };
         let followed = mirrors.checked_for(set, cube)?.split(base.is_some());
         let cells = followed.map(|mirrors| mirrors.cells_with(cube));
-        let followed = [0, 1].map(|of| Mirrors { cells: &cells[of], ..followed[of] });
+        let followed = [0, 1].map(|number| Mirrors { cells: &cells[number], ..followed[number] });
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
@@ -187,7 +187,8 @@ impl Reconstructor {
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), followed[0].cells.len()));
         let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
         let rays = recording.batch.plane_bytes as usize / 4;
-        let [mirrors, lobes] = followed.map(|of| Bounces::lend(&self.device, of, rays, CurvedSearch::default()));
+        let [mirrors, lobes] =
+            followed.map(|mirrors| Bounces::lend(&self.device, mirrors, rays, CurvedSearch::default()));
         let bounces = [mirrors?, lobes?];
         let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
         self.record_positions(prepared, &mut recording)?;

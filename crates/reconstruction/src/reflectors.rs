@@ -108,7 +108,7 @@ impl LobeLight {
         matches!(self, Self::SentRest | Self::Sent)
     }
 
-    /// In a shader, of a mirror.
+    /// The part of a mirror's lobe, as a WGSL expression.
     pub fn share(self) -> &'static str {
         match self {
             Self::GatheredMirrors => "mirror_share(mirror.reflector.roughness)",
@@ -175,7 +175,7 @@ impl Reflection {
         }
     }
 
-    /// Those that stand for all, without lobes.
+    /// The variants that stand for all, without lobes.
     pub fn all() -> Vec<Self> {
         let mut all = [false, true].map(|environment_map| Self { environment_map, ..Self::default() }).to_vec();
         for (lights, visibility_words) in [(0, 0), (3, 0), (3, 1), (255, 64)] {
@@ -189,7 +189,7 @@ impl Reflection {
         all
     }
 
-    /// This one, and those with lobes where surfaces may have any.
+    /// The variant itself and, where surfaces may have lobes, one for each way to light them.
     pub fn with_lobes(self, lobes: &[LobeLight]) -> Vec<Self> {
         let lobes = if self.highlight == Some(Highlight::Ggx) { lobes } else { &[] };
         std::iter::once(None).chain(lobes.iter().copied().map(Some)).map(|lobe| Self { lobe, ..self }).collect()

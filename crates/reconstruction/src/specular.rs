@@ -1,6 +1,6 @@
 //! Adds the light that depends on the viewer to pixels that show a surface.
 
-use gpu::{ResourceTraits, ShaderVariant};
+use gpu::{DynamicUniforms, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, RayLists};
@@ -19,7 +19,7 @@ pub(crate) struct Specular {
 
 impl ShaderVariant for Specular {
     const TEMPLATE: &'static str = "specular.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! { single_pole => false, listed => self.listed, ..self.reflection.context(self.set) }
@@ -28,8 +28,8 @@ impl ShaderVariant for Specular {
     fn all() -> Vec<Self> {
         let mut all = Vec::new();
         for set in SetVariant::all() {
-            for matt in Reflection::all().into_iter().filter(|matt| matt.highlight.is_some()) {
-                for reflection in matt.with_lobes(&[LobeLight::sent(matt.mirror_cells.is_some())]) {
+            for lit in Reflection::all().into_iter().filter(|lit| lit.highlight.is_some()) {
+                for reflection in lit.with_lobes(&[LobeLight::sent(lit.mirror_cells.is_some())]) {
                     all.extend([false, true].map(|listed| Self { set, listed, reflection }));
                 }
             }

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{GpuTone, ResourceTraits};
+use gpu::{DynamicUniforms, GpuTone};
 use minijinja::{Value, context};
 
 /// Shaders name each camera; more would make them too long.
@@ -15,7 +15,7 @@ pub(crate) const FAR_AWAY: f32 = 3.0e38;
 /// Positions in an image are kept this far from the border of the last cell.
 pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
 /// Each dispatch sees one piece of a view of a batch.
-pub(crate) const ONE_VIEW: ResourceTraits = &["work"];
+pub(crate) const ONE_VIEW: DynamicUniforms = &["work"];
 
 /// Switches of shaders that include `view_work.wgsl`.
 #[derive(Debug, Clone, Copy, Default)]

@@ -81,7 +81,7 @@ pub(crate) struct Position {
 }
 
 impl<'a> Batch<'a> {
-    /// Work without cameras, as that over points is, that is not traced.
+    /// Work that is not traced, and without cameras, as for listed points.
     pub fn new(work: DrawWork<'a>, output: Output) -> Self {
         let position = Position::default();
         let tone = ToneMapping::NONE;

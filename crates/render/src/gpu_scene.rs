@@ -80,7 +80,7 @@ pub(crate) struct Draw {
 }
 
 impl Draw {
-    /// Draws with equal ones have one pipeline, and the same textures.
+    /// Draws of equal state share a pipeline and textures.
     pub fn state(&self) -> (MaterialTraits, u32) {
         (self.material, self.texture)
     }

@@ -95,9 +95,7 @@ fn structs_of_draws_have_the_wgsl_layout() {
     });
     let lines = host!(GpuLines { forward_in_world, spacing_m, range_m, columns, least_share, capacity });
     let crossing = host!(Crossing { line, planar_depth_m, plane_normal_oct16, padding, surface });
-    let appended = RasterVariant::all()
-        .into_iter()
-        .find(|variant| variant.context().get_attr("appended").is_ok_and(|is| is.is_true()));
+    let appended = RasterVariant::all().into_iter().find(|variant| variant.appended);
     let appended = parsed(&appended.expect("a variant"));
     assert_eq!(lines, shader(&appended, "Lines"));
     assert_eq!(crossing, shader(&appended, "Crossing"));
@@ -296,7 +294,7 @@ fn every_variable_of_a_pass_has_a_resource() {
             declared.insert(name.to_owned());
         }
     }
-    for name in crate::shaders::TRAITS {
+    for name in crate::shaders::DYNAMIC_UNIFORMS {
         assert!(declared.contains(*name), "no shader declares {name}, which has a dynamic offset");
     }
 }

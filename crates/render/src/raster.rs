@@ -44,7 +44,7 @@ pub(crate) struct RasterVariant {
     wind: bool,
     redundancy: Option<RedundancyVariant>,
     /// All that the lines of a parallel camera meet is kept.
-    appended: bool,
+    pub appended: bool,
 }
 
 #[repr(C)]
@@ -94,6 +94,7 @@ impl RasterVariant {
 
 impl ShaderVariant for RasterVariant {
     const TEMPLATE: &'static str = "raster.wgsl";
+
     fn context(&self) -> Value {
         let Self { material, shading, surface_id, triangle_normal, depth_only, wind, redundancy, appended } = *self;
         let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } = material;

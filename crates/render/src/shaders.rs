@@ -1,6 +1,6 @@
 //! The shader templates of this crate, the numbers that they share with Rust, and all their variants.
 
-use gpu::{ResourceTraits, ShaderError, ShaderSource, Templates, source, wgsl_constants, wgsl_files};
+use gpu::{DynamicUniforms, ShaderError, ShaderSource, Templates, source, wgsl_constants, wgsl_files};
 
 use crate::known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS};
 use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, DOUBLE_SIDED, SPECULAR, UNLIT, VERTEX};
@@ -37,14 +37,14 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
 };
 
 /// Cameras and objects have an element for each dispatch or draw.
-pub(crate) const TRAITS: ResourceTraits = &["camera", "object"];
+pub(crate) const DYNAMIC_UNIFORMS: DynamicUniforms = &["camera", "object"];
 
 /// [`SHADERS`] and templates of redundancy tests, each with its name.
 ///
 /// # Errors
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
-    Ok(Templates::new(&[SHADERS, tests].concat())?.with_traits(TRAITS).declaring(wgsl_constants! {
+    Ok(Templates::new(&[SHADERS, tests].concat())?.with_dynamic_uniforms(DYNAMIC_UNIFORMS).declaring(wgsl_constants! {
         ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MAX_CACHE_CAMERAS, MAX_LAMP_SHARES, MIRROR, MOST_LAYERS,
         NOTHING, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE, REFERENCE_FOOTPRINTS, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
     }))

@@ -1,4 +1,4 @@
-//! What a sampler is asked for.
+//! Requests to sample.
 
 use depth_image::Camera;
 use render::{DrawWork, SamplePlanes};

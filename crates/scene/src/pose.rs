@@ -34,7 +34,7 @@ impl MovingInstance {
         self.moved(rest, world_from_nodes, Placement::from, placed)
     }
 
-    /// As [`Self::posed`], the details of vertices: tangents turn.
+    /// The details of vertices, which follow the joints as [`Self::posed`] has them: tangents turn.
     #[must_use]
     pub fn posed_details(&self, rest: &[VertexDetail], world_from_nodes: &[DAffine3]) -> Vec<VertexDetail> {
         self.moved(rest, world_from_nodes, Affine3A::from, turned)

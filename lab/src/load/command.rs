@@ -5,7 +5,7 @@ use std::time::Duration;
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use app_core::progress::bar;
-use app_core::sizes::SizePx;
+use app_core::sizes::{SizePx, within};
 use clap::Args;
 use glam::UVec2;
 use render::Lighting;
@@ -15,7 +15,7 @@ use super::clients::Wanted;
 use super::{phases, report};
 use crate::cpu_share::Hierarchy;
 use crate::processes::{Setting, Share};
-use crate::study::{RunArgs, new_report, number_within};
+use crate::study::{RunArgs, new_report};
 
 /// Measures four loads, each on a coordinator and node processes of its own. Of views of 320×180, 8 clients
 /// ask for 10 frames a second, 16 for 15, 80 for 10, and 200 for none, unless options say otherwise. With --quick each load
@@ -33,7 +33,7 @@ pub struct LoadArgs {
     #[arg(long, default_value_t = SizePx(UVec2::new(320, 180)), value_name = "WxH")]
     size: SizePx,
     /// Frames a second that each client asks for, in place of 10, 15 and 10
-    #[arg(long, value_name = "HZ", value_parser = |text: &str| number_within(text, 0.01..=1000.0))]
+    #[arg(long, value_name = "HZ", value_parser = within(0.01..=1000.0))]
     rate: Option<f64>,
     /// How views are made: a reconstruction method or direct [default: by the lighting]
     #[arg(long, value_name = "NAME")]
@@ -43,11 +43,11 @@ pub struct LoadArgs {
     nodes: u16,
     /// Cores of each node, by a control group; 0 sets no limit. Without a limit, each node of a machine promises all of
     /// it [default: all cores but half a one, divided; no limit for one node, or without control groups]
-    #[arg(long, value_name = "CORES", value_parser = |text: &str| number_within(text, 0.0..=1024.0))]
+    #[arg(long, value_name = "CORES", value_parser = within(0.0..=1024.0))]
     share: Option<f64>,
     /// The time of each load
     #[arg(long, default_value_t = 10.0, value_name = "MIN",
-        value_parser = |text: &str| number_within(text, 0.1..=1440.0))]
+        value_parser = within(0.1..=1440.0))]
     minutes: f64,
     #[command(flatten)]
     run: RunArgs,

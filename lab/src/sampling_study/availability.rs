@@ -3,7 +3,7 @@
 use depth_image::DepthImage;
 use rayon::prelude::*;
 
-use super::held::{Held, held_samples, is_held};
+use super::held::{ImageSurfaces, held_samples, is_held};
 
 /// The shares of many frames.
 #[derive(Debug, Clone, Default)]
@@ -11,7 +11,7 @@ pub struct Availability(Vec<f64>);
 
 impl Availability {
     /// Adds one frame.
-    pub fn add(&mut self, frame: &DepthImage, set: &[Held<'_>]) {
+    pub fn add(&mut self, frame: &DepthImage, set: &[ImageSurfaces<'_>]) {
         let samples = held_samples(frame);
         if !samples.is_empty() {
             let available = samples.par_iter().filter(|sample| is_held(sample, set)).count();

@@ -4,7 +4,7 @@ use depth_image::DepthImage;
 use rayon::prelude::*;
 use sampling::SamplingMethod;
 
-use super::held::{Held, HeldSample, held_samples, is_held};
+use super::held::{HeldSample, ImageSurfaces, held_samples, is_held};
 use super::methods::METHODS;
 
 /// Samples of one image of one method, before dilation and hysteresis.
@@ -32,12 +32,12 @@ impl ImageCount {
 
 /// Counts of the sets of all methods, conventional sampling first.
 pub fn image_counts(sets: &[Vec<DepthImage>]) -> Vec<Vec<ImageCount>> {
-    let conventional: Vec<Held<'_>> = sets[0].iter().filter_map(Held::of).collect();
+    let conventional: Vec<ImageSurfaces<'_>> = sets[0].iter().filter_map(ImageSurfaces::of).collect();
     METHODS.iter().zip(sets).map(|(&method, set)| counts_of(method, set, &conventional)).collect()
 }
 
-fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[Held<'_>]) -> Vec<ImageCount> {
-    let held: Vec<Held<'_>> = set.iter().filter_map(Held::of).collect();
+fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[ImageSurfaces<'_>]) -> Vec<ImageCount> {
+    let held: Vec<ImageSurfaces<'_>> = set.iter().filter_map(ImageSurfaces::of).collect();
     let counts = set.iter().enumerate().map(|(number, image)| {
         let samples = held_samples(image);
         let beside = match method {
@@ -57,7 +57,7 @@ fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[Held<'_
 }
 
 /// Marks samples that a frame needs: it shows their surface at the same pixel.
-pub fn mark_useful(counts: &mut [Vec<ImageCount>], frame: &Held<'_>) {
+pub fn mark_useful(counts: &mut [Vec<ImageCount>], frame: &ImageSurfaces<'_>) {
     for count in counts.iter_mut().flatten() {
         let samples = count.disoccluded.par_iter().zip(count.useful.par_iter_mut());
         samples.filter(|(_, useful)| !**useful).for_each(|(sample, useful)| *useful = frame.has(sample));

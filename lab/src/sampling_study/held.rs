@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4};
 
 /// The surface ids of an image.
 #[derive(Debug, Clone, Copy)]
-pub struct Held<'a> {
+pub struct ImageSurfaces<'a> {
     homogeneous_pixel_from_world: [Vec4; 3],
     columns: f32,
     rows: f32,
@@ -25,7 +25,7 @@ pub struct HeldSample {
     pub id: SurfaceId,
 }
 
-impl<'a> Held<'a> {
+impl<'a> ImageSurfaces<'a> {
     /// The surfaces of an image; `None` without surface ids.
     pub fn of(image: &'a DepthImage) -> Option<Self> {
         let camera = image.camera.reference();
@@ -66,7 +66,7 @@ pub fn held_samples(image: &DepthImage) -> Vec<HeldSample> {
 }
 
 /// Whether one of some images has a sample.
-pub fn is_held(sample: &HeldSample, images: &[Held<'_>]) -> bool {
+pub fn is_held(sample: &HeldSample, images: &[ImageSurfaces<'_>]) -> bool {
     images.iter().any(|image| image.has(sample))
 }
 
@@ -94,13 +94,13 @@ mod tests {
         };
         let samples = held_samples(&image);
         assert_eq!(samples.len(), 192);
-        let held = Held::of(&image).unwrap();
+        let held = ImageSurfaces::of(&image).unwrap();
         assert!(samples.iter().all(|sample| held.has(sample)));
         let other = HeldSample { id: id(999), ..samples[5] };
         let beside = HeldSample { point_in_world: Vec3::X * 9.0, ..samples[5] };
         assert!(!held.has(&other) && !held.has(&beside));
         image.inverse_depth_per_m[5] = HOLE_INVERSE_DEPTH;
-        assert!(!Held::of(&image).unwrap().has(&samples[5]));
+        assert!(!ImageSurfaces::of(&image).unwrap().has(&samples[5]));
         assert_eq!(held_samples(&image).len(), 191);
     }
 }

@@ -8,11 +8,11 @@ use sampling::SamplingMethod;
 use super::availability::Availability;
 use super::counts::{ImageCount, image_counts, mark_useful};
 use super::extent::Extent;
-use super::held::Held;
+use super::held::ImageSurfaces;
 use super::methods::METHODS;
 use super::pictures;
 use super::subject::{Subject, WITH_IDS};
-use super::visibility::{Seen, seen};
+use super::visibility::{VisibilityEstimates, seen};
 
 /// The side of output frames, as in the paper.
 const FRAME_PX: UVec2 = UVec2::splat(512);
@@ -21,7 +21,7 @@ const FRAME_PX: UVec2 = UVec2::splat(512);
 pub struct SceneRow {
     pub(super) name: String,
     pub(super) counts: Vec<Vec<ImageCount>>,
-    pub(super) seen: Vec<Vec<Seen>>,
+    pub(super) seen: Vec<Vec<VisibilityEstimates>>,
     pub(super) available: Vec<Availability>,
 }
 
@@ -35,13 +35,14 @@ impl SceneRow {
         let sets =
             METHODS.iter().map(|&method| subject.sample(method, size_px, WITH_IDS)).collect::<Result<Vec<_>, _>>()?;
         let mut counts = image_counts(&sets);
-        let held: Vec<Vec<Held<'_>>> = sets.iter().map(|set| set.iter().filter_map(Held::of).collect()).collect();
+        let held: Vec<Vec<ImageSurfaces<'_>>> =
+            sets.iter().map(|set| set.iter().filter_map(ImageSurfaces::of).collect()).collect();
         let mut available = vec![Availability::default(); METHODS.len()];
         let views = subject.between(extent.views, FRAME_PX);
         let progress = bar(format!("{}: frames", subject.name), views.len());
         subject.each_frame(&views, |frames| {
             for frame in frames {
-                if let Some(frame) = Held::of(frame) {
+                if let Some(frame) = ImageSurfaces::of(frame) {
                     mark_useful(&mut counts, &frame);
                 }
                 available.iter_mut().zip(&held).for_each(|(available, set)| available.add(frame, set));

@@ -6,7 +6,7 @@ use sampling::{Redundancy, SamplingMethod};
 
 use super::counts::{image_counts, mark_useful, percent};
 use super::extent::Extent;
-use super::held::Held;
+use super::held::ImageSurfaces;
 use super::methods::{IMAGES, METHODS};
 use super::subject::{Subject, WITH_IDS};
 use super::visibility::seen;
@@ -76,7 +76,7 @@ impl SizeRow {
         let disoccluded = seen(rays, by_rays, &visible, &viewpoints, &views, seeds);
         let mut counts = image_counts(&[whole, subject.sample(METHODS[1], size_px, WITH_IDS)?]);
         subject.each_frame(&views, |frames| {
-            frames.iter().filter_map(Held::of).for_each(|frame| mark_useful(&mut counts, &frame));
+            frames.iter().filter_map(ImageSurfaces::of).for_each(|frame| mark_useful(&mut counts, &frame));
             Ok(())
         })?;
         let [conventional, by_pixel] = [&counts[0], &counts[1]];

@@ -8,7 +8,7 @@ use super::counts::{ImageCount, percent};
 use super::methods::{IMAGES, METHODS};
 use super::paper::{PaperImage, paper_available, paper_image};
 use super::scene::SceneRow;
-use super::visibility::{Estimate, Seen};
+use super::visibility::{Estimate, VisibilityEstimates};
 use crate::study::{Column, table};
 
 const PIXEL: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Pixel);
@@ -21,7 +21,7 @@ struct ImageRow<'s> {
     method: SamplingMethod,
     number: usize,
     count: &'s ImageCount,
-    seen: Seen,
+    seen: VisibilityEstimates,
     paper: PaperImage,
 }
 

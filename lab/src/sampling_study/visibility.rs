@@ -18,7 +18,7 @@ pub struct Estimate {
 
 /// Estimates of one image.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Seen {
+pub struct VisibilityEstimates {
     pub redundant: Estimate,
     pub disoccluded: Estimate,
     /// The share of its disoccluded samples.
@@ -40,7 +40,7 @@ pub fn seen(
     viewpoints: &[PinholeCamera],
     views: &[PinholeCamera],
     seeds: usize,
-) -> Vec<Seen> {
+) -> Vec<VisibilityEstimates> {
     let own: Vec<PinholeCamera> = set.iter().map(|image| *image.camera.reference()).collect();
     let images = set.iter().enumerate().map(|(number, image)| {
         let samples = seeded(held_samples(image), seeds);
@@ -62,7 +62,7 @@ pub fn seen(
         let redundant = samples.par_iter().filter(|sample| by(sample, earlier)).count();
         let disoccluded: Vec<&HeldSample> = samples.par_iter().filter(|sample| !by(sample, beside)).collect();
         let useful = disoccluded.par_iter().filter(|sample| by(sample, views)).count();
-        Seen {
+        VisibilityEstimates {
             redundant: Estimate::of(redundant, samples.len()),
             disoccluded: Estimate::of(disoccluded.len(), samples.len()),
             useful: Estimate::of(useful, disoccluded.len()),

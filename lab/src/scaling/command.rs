@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use app_core::setup::SceneArgs;
+use app_core::sizes::within;
 use clap::Args;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -15,7 +16,7 @@ use super::matrix::Extent;
 use super::measure::{Request, take};
 use super::report::{report, show};
 use super::subject::Subject;
-use crate::study::{RunArgs, number_within};
+use crate::study::RunArgs;
 
 /// Measures the time between two sample sets on a coordinator and P node processes, for P = 2…11 nodes, V = 10…1000
 /// views and every policy. Each node has an equal share of this machine's processors by control groups of Linux, so
@@ -43,7 +44,7 @@ pub struct ScalingArgs {
     #[arg(long, default_value_t = 1000, value_name = "V", value_parser = clap::value_parser!(u32).range(10..=1000))]
     views: u32,
     /// Cores of each node [default: all but 0.35 for the client, in equal parts]
-    #[arg(long, value_name = "CORES", value_parser = |text: &str| number_within(text, 0.01..=64.0))]
+    #[arg(long, value_name = "CORES", value_parser = within(0.01..=64.0))]
     quota: Option<f64>,
     /// The most simulated nodes P
     #[arg(long, default_value_t = 1000, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=1000))]

@@ -73,10 +73,10 @@ fn workload_table(status: &ClusterStatus) -> Table {
         &status.workloads,
         &[
             ("workload", "", |workload| (workload.number as f64).into()),
-            ("scene", "", |workload| of_plan(workload, |plan| short_hash(&plan.assignment.workload).into())),
-            ("light", "", |workload| of_plan(workload, |plan| plan.assignment.workload.lighting.clone().into())),
-            ("policy", "", |workload| of_plan(workload, |plan| plan.assignment.policy.to_string().into())),
-            ("K", "", |workload| of_plan(workload, |plan| (plan.sampler_count() as f64).into())),
+            ("scene", "", |workload| plan_cell(workload, |plan| short_hash(&plan.assignment.workload).into())),
+            ("light", "", |workload| plan_cell(workload, |plan| plan.assignment.workload.lighting.clone().into())),
+            ("policy", "", |workload| plan_cell(workload, |plan| plan.assignment.policy.to_string().into())),
+            ("K", "", |workload| plan_cell(workload, |plan| (plan.sampler_count() as f64).into())),
             ("sessions", "", |workload| f64::from(workload.session_count).into()),
             ("viewers", "", |workload| f64::from(workload.viewer_count).into()),
             ("V", "", |workload| (workload.views_per_set as f64).into()),
@@ -86,7 +86,7 @@ fn workload_table(status: &ClusterStatus) -> Table {
     )
 }
 
-fn of_plan(workload: &WorkloadStatus, cell: fn(&SessionPlan) -> Cell) -> Cell {
+fn plan_cell(workload: &WorkloadStatus, cell: fn(&SessionPlan) -> Cell) -> Cell {
     workload.plan.as_ref().map_or(Cell::Missing, cell)
 }
 

@@ -43,10 +43,10 @@ fn check_all(
     let mut seen = HashSet::new();
     let different: Vec<&ShaderSource> =
         sources.iter().filter(|source| seen.insert((source.template, source.wgsl.as_str()))).collect();
-    different.par_iter().for_each(|ShaderSource { name, template, wgsl, traits }| {
+    different.par_iter().for_each(|ShaderSource { name, template, wgsl, dynamic_uniforms }| {
         let entries = entries(name, wgsl);
         assert_eq!(entries, expected(template, entries.len()), "{name}");
-        ShaderInterface::of(template, wgsl, traits).unwrap_or_else(|error| panic!("{name}: {error}"));
+        ShaderInterface::of(template, wgsl, dynamic_uniforms).unwrap_or_else(|error| panic!("{name}: {error}"));
     });
     variants
 }

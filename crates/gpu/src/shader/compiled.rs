@@ -5,7 +5,7 @@ use std::num::NonZeroU64;
 use wgpu::{BindGroupLayout, BindingResource};
 
 use super::bound_group::{BoundGroup, Form};
-use super::interface::{Binding, Resource, ResourceTraits, ShaderInterface};
+use super::interface::{Binding, DynamicUniforms, Resource, ShaderInterface};
 use crate::{device::Gpu, error::ShaderError};
 
 /// A compiled shader with the layout that its WGSL asks for.
@@ -19,7 +19,7 @@ pub struct Shader {
     groups: Vec<BindGroupLayout>,
     device: wgpu::Device,
     wgsl: String,
-    traits: ResourceTraits,
+    dynamic_uniforms: DynamicUniforms,
 }
 
 impl Shader {
@@ -27,8 +27,8 @@ impl Shader {
     ///
     /// # Errors
     /// WGSL that cannot be parsed, or a variable of a type that is not supported.
-    pub fn new(gpu: &Gpu, label: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
-        let interface = ShaderInterface::of(label, wgsl, traits)?;
+    pub fn new(gpu: &Gpu, label: &str, wgsl: &str, dynamic_uniforms: DynamicUniforms) -> Result<Self, ShaderError> {
+        let interface = ShaderInterface::of(label, wgsl, dynamic_uniforms)?;
         let device = gpu.device.clone();
         let mut groups = Vec::with_capacity(interface.groups.len());
         for group in &interface.groups {
@@ -43,12 +43,12 @@ impl Shader {
         });
         let source = wgpu::ShaderSource::Wgsl(wgsl.into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source });
-        Ok(Self { interface, module, layout, groups, device, wgsl: wgsl.to_owned(), traits })
+        Ok(Self { interface, module, layout, groups, device, wgsl: wgsl.to_owned(), dynamic_uniforms })
     }
 
     /// The same shader on another device.
     pub(super) fn on(&self, gpu: &Gpu) -> Result<Self, ShaderError> {
-        Self::new(gpu, &self.interface.shader, &self.wgsl, self.traits)
+        Self::new(gpu, &self.interface.shader, &self.wgsl, self.dynamic_uniforms)
     }
 
     /// Binds resources to all variables of a group by name. Of several resources of one name, the first counts.

@@ -58,7 +58,7 @@ impl<'r> Binding<'r> {
 }
 
 /// Names of uniforms that have an element for each dispatch or draw, which sees its own at a dynamic offset.
-pub type ResourceTraits = &'static [&'static str];
+pub type DynamicUniforms = &'static [&'static str];
 
 /// A resource at its binding.
 #[derive(Debug, Clone)]
@@ -86,7 +86,7 @@ impl ShaderInterface {
     ///
     /// # Errors
     /// WGSL that cannot be parsed, or a variable of a type that is not supported.
-    pub fn of(shader: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
+    pub fn of(shader: &str, wgsl: &str, dynamic_uniforms: DynamicUniforms) -> Result<Self, ShaderError> {
         let mut options = Options::new();
         options.capabilities = Capabilities::all();
         let module = Frontend::new_with_options(options).parse(wgsl);
@@ -107,7 +107,7 @@ impl ShaderInterface {
         for (_, variable) in module.global_variables.iter() {
             let Some(place) = variable.binding else { continue };
             let name = variable.name.clone().unwrap_or_default();
-            let has_dynamic_offset = traits.contains(&name.as_str());
+            let has_dynamic_offset = dynamic_uniforms.contains(&name.as_str());
             let is_filterable = filtered.contains(&place.group);
             let ty = binding_type(&module, variable, has_dynamic_offset, is_filterable)
                 .ok_or_else(|| invalid(shader, format!("{name} has a type that is not supported")))?;
@@ -229,7 +229,7 @@ mod tests {
         @group(1) @binding(0) var<storage, read_write> words: array<u32>;
         @compute @workgroup_size(8, 4) fn main() { words[0] = u32(camera.near); }
     ";
-    const CAMERA: ResourceTraits = &["camera"];
+    const CAMERA: DynamicUniforms = &["camera"];
 
     fn interface() -> ShaderInterface {
         ShaderInterface::of("test", WGSL, CAMERA).expect("an interface")

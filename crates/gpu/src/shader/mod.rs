@@ -14,7 +14,7 @@ pub use bound_group::BoundGroup;
 pub use compiled::Shader;
 pub use compute_pass::{ComputePass, DispatchSize};
 pub use draw_pass::{DrawPass, DrawState, DrawVariant};
-pub use interface::{Binding, ResourceTraits, ShaderInterface, uniform_elements, uniform_stride};
+pub use interface::{Binding, DynamicUniforms, ShaderInterface, uniform_elements, uniform_stride};
 pub use pass_cache::PassCache;
 pub use template::{Templates, WgslLiteral};
 pub use variant::{Pass, ShaderSource, ShaderVariant, source, sources, switches};

@@ -70,7 +70,7 @@ impl<P> PassCache<P> {
             return Ok(pass.clone());
         }
         let source = source(&self.templates, variant)?;
-        let shader = Shader::new(&self.gpu, source.template, &source.wgsl, source.traits)?;
+        let shader = Shader::new(&self.gpu, source.template, &source.wgsl, source.dynamic_uniforms)?;
         let pass = Arc::new(P::build(&self.gpu, shader, variant));
         *entry = Some(pass.clone());
         Ok(pass)

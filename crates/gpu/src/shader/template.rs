@@ -9,7 +9,7 @@ use std::{collections::HashMap, fmt::Debug};
 use depth_image::{LOBE_ROUGHNESS, LOBE_SIZE_PX};
 use minijinja::{Environment, UndefinedBehavior, Value};
 
-use super::interface::ResourceTraits;
+use super::interface::DynamicUniforms;
 use crate::{error::ShaderError, table::TABLE_WIDTH_LOG2};
 
 /// Shader texts by name.
@@ -17,7 +17,7 @@ pub struct Templates {
     environment: Environment<'static>,
     declared: Vec<(&'static str, String)>,
     /// Uniforms with dynamic offsets in all templates.
-    pub(super) traits: ResourceTraits,
+    pub(super) dynamic_uniforms: DynamicUniforms,
 }
 
 /// A number that WGSL has a literal for.
@@ -73,7 +73,7 @@ impl Templates {
                 .add_template(name, text)
                 .map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         }
-        Ok(Self { environment, declared: Vec::new(), traits: &[] })
+        Ok(Self { environment, declared: Vec::new(), dynamic_uniforms: &[] })
     }
 
     /// Adds values for `{{ NAME }}` in all templates, such as those of [`wgsl_constants!`](crate::wgsl_constants).
@@ -85,8 +85,8 @@ impl Templates {
 
     /// Gives uniforms of these names dynamic offsets, in all variants that name none of their own.
     #[must_use]
-    pub fn with_traits(self, traits: ResourceTraits) -> Self {
-        Self { traits, ..self }
+    pub fn with_dynamic_uniforms(self, dynamic_uniforms: DynamicUniforms) -> Self {
+        Self { dynamic_uniforms, ..self }
     }
 
     /// Declares numbers of [`wgsl_constants!`](crate::wgsl_constants) in all texts that name them. A template cannot declare

@@ -4,15 +4,15 @@ use std::fmt::Debug;
 
 use minijinja::{Value, context};
 
-use super::{compiled::Shader, interface::ResourceTraits, template::Templates};
+use super::{compiled::Shader, interface::DynamicUniforms, template::Templates};
 use crate::{device::Gpu, error::ShaderError};
 
 /// A shader's switches. Each set of them is a text of its own, and has its own `Debug` text.
 pub trait ShaderVariant: Debug {
     /// The template, which is also the label of its passes.
     const TEMPLATE: &'static str;
-    /// Uniforms with dynamic offsets; where there are none, those of the templates have them.
-    const TRAITS: ResourceTraits = &[];
+    /// Uniforms with dynamic offsets. A variant that names none has those of the templates.
+    const DYNAMIC_UNIFORMS: DynamicUniforms = &[];
 
     /// The values that the template uses.
     fn context(&self) -> Value {
@@ -33,27 +33,27 @@ pub trait ShaderVariant: Debug {
 /// Declares a shader variant without switches, or with those that another type has: its `context` and its `all`.
 #[macro_export]
 macro_rules! shader_variant {
-    ($name:ident, $template:literal, $traits:expr) => {
+    ($name:ident, $template:literal, $dynamic_uniforms:expr) => {
         #[doc = concat!("`", $template, "`, which has no switches.")]
         #[derive(Debug)]
         pub(crate) struct $name;
 
         impl $crate::ShaderVariant for $name {
             const TEMPLATE: &'static str = $template;
-            const TRAITS: $crate::ResourceTraits = $traits;
+            const DYNAMIC_UNIFORMS: $crate::DynamicUniforms = $dynamic_uniforms;
             fn all() -> Vec<Self> {
                 vec![Self]
             }
         }
     };
-    ($name:ident($switches:ty), $template:literal, $traits:expr) => {
+    ($name:ident($switches:ty), $template:literal, $dynamic_uniforms:expr) => {
         #[doc = concat!("The switches of `", $template, "`.")]
         #[derive(Debug)]
         pub(crate) struct $name(pub $switches);
 
         impl $crate::ShaderVariant for $name {
             const TEMPLATE: &'static str = $template;
-            const TRAITS: $crate::ResourceTraits = $traits;
+            const DYNAMIC_UNIFORMS: $crate::DynamicUniforms = $dynamic_uniforms;
             fn context(&self) -> minijinja::Value {
                 self.0.context()
             }
@@ -77,7 +77,7 @@ pub struct ShaderSource {
     pub name: String,
     pub template: &'static str,
     pub wgsl: String,
-    pub traits: ResourceTraits,
+    pub dynamic_uniforms: DynamicUniforms,
 }
 
 /// The texts of [`ShaderVariant::all`].
@@ -97,8 +97,9 @@ macro_rules! shader_sources {
 /// A template that is broken.
 pub fn source<V: ShaderVariant>(templates: &Templates, variant: &V) -> Result<ShaderSource, ShaderError> {
     let wgsl = templates.render(V::TEMPLATE, variant.context())?;
-    let traits = if V::TRAITS.is_empty() { templates.traits } else { V::TRAITS };
-    Ok(ShaderSource { name: variant.name(), template: V::TEMPLATE, wgsl, traits })
+    let dynamic_uniforms =
+        if V::DYNAMIC_UNIFORMS.is_empty() { templates.dynamic_uniforms } else { V::DYNAMIC_UNIFORMS };
+    Ok(ShaderSource { name: variant.name(), template: V::TEMPLATE, wgsl, dynamic_uniforms })
 }
 
 /// Every position of `N` switches.

@@ -38,15 +38,17 @@ enum Empty {
 
 impl Empty {
     fn of(gpu: &Gpu, resource: &Resource, form: Option<Form>) -> Self {
-        let (dimension, usage) = match resource.layout.ty {
-            BindingType::Sampler(_) => return Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2])),
-            BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
-            BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
+        let (dimension, usage, form) = match (resource.layout.ty, form) {
+            (BindingType::Sampler(_), _) => return Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2])),
+            (BindingType::StorageTexture { view_dimension, .. }, Some(form)) => {
+                (view_dimension, TextureUsages::STORAGE_BINDING, form)
+            }
+            (BindingType::Texture { view_dimension, .. }, Some(form)) => {
+                (view_dimension, TextureUsages::TEXTURE_BINDING, form)
+            }
             _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM | BufferUsages::STORAGE)),
         };
-        let Some(Form { format, is_power_of_two, has_mips }) = form else {
-            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM | BufferUsages::STORAGE));
-        };
+        let Form { format, is_power_of_two, has_mips } = form;
         let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("empty"),
@@ -72,7 +74,7 @@ impl Empty {
 }
 
 impl FirstUses {
-    /// Warms a shader at its first use with resources of these forms, of which the frame is told.
+    /// Warms a shader at its first use with resources of these forms, and counts that use as work of the frame.
     pub fn make_ready(
         &self,
         frame: &mut Frame<'_>,
@@ -160,7 +162,7 @@ mod tests {
             sums[id.x] = camera.near + color.x + f32(word);
         }
     ";
-    const TRAITS: crate::ResourceTraits = &["camera"];
+    const DYNAMIC_UNIFORMS: crate::DynamicUniforms = &["camera"];
 
     fn texture(gpu: &Gpu, size: [u32; 3], format: TextureFormat, dimension: wgpu::TextureViewDimension) -> TextureView {
         let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING;
@@ -199,7 +201,7 @@ mod tests {
     #[test]
     fn a_shader_is_compiled_on_a_second_device_at_its_first_use_of_a_form_beside_a_live_stream() {
         let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
-        let pass = || ComputePass::new(&gpu, Shader::new(&gpu, "test", WGSL, TRAITS).expect("a shader"));
+        let pass = || ComputePass::new(&gpu, Shader::new(&gpu, "test", WGSL, DYNAMIC_UNIFORMS).expect("a shader"));
         assert!(!is_warmed(&gpu, &pass(), 8), "nobody watches");
         let _live = gpu.device_queue.live_stream();
         let pass = pass();

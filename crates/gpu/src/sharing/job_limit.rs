@@ -11,8 +11,14 @@ use super::queue::count_waited;
 /// Bounds the jobs of each class. A job of one class never waits for one of another.
 pub struct JobLimit {
     most: usize,
-    /// Each with a signal that one of its jobs has ended or begun.
-    classes: [(Mutex<Jobs>, Condvar); WorkClass::COUNT],
+    classes: [ClassJobs; WorkClass::COUNT],
+}
+
+#[derive(Default)]
+struct ClassJobs {
+    jobs: Mutex<Jobs>,
+    /// Signals that a job has ended or begun.
+    changed: Condvar,
 }
 
 #[derive(Default)]
@@ -23,7 +29,7 @@ struct Jobs {
 }
 
 /// A job that counts until it is dropped.
-pub struct Job<'l>(&'l (Mutex<Jobs>, Condvar));
+pub struct Job<'l>(&'l ClassJobs);
 
 impl JobLimit {
     /// At most so many jobs of each class.
@@ -35,27 +41,27 @@ impl JobLimit {
     /// Waits until there is room for one more.
     pub fn begin(&self, class: WorkClass) -> Job<'_> {
         let class = &self.classes[class as usize];
-        let mut jobs = class.0.lock();
+        let mut jobs = class.jobs.lock();
         jobs.last_ticket += 1;
         let ticket = jobs.last_ticket;
         jobs.waiting.push_back(ticket);
         let start = Instant::now();
         while jobs.running >= self.most || jobs.waiting.front() != Some(&ticket) {
-            class.1.wait(&mut jobs);
+            class.changed.wait(&mut jobs);
         }
         count_waited(start);
         jobs.waiting.pop_front();
         jobs.running += 1;
         // The next may have room, too.
-        class.1.notify_all();
+        class.changed.notify_all();
         Job(class)
     }
 }
 
 impl Drop for Job<'_> {
     fn drop(&mut self) {
-        self.0.0.lock().running -= 1;
-        self.0.1.notify_all();
+        self.0.jobs.lock().running -= 1;
+        self.0.changed.notify_all();
     }
 }
 
@@ -79,7 +85,7 @@ mod tests {
                     let _job = limit.begin(WorkClass::Batch);
                     sender.send(number).expect("a receiver");
                 });
-                while limit.classes[1].0.lock().waiting.len() <= number {
+                while limit.classes[1].jobs.lock().waiting.len() <= number {
                     thread::yield_now();
                 }
             }

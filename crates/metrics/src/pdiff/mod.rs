@@ -41,20 +41,20 @@ const WHITE_CD_M2: f32 = 100.0;
 pub fn pdiff_map(reference: &View, test: &View) -> Result<Vec<bool>, MetricsError> {
     expect_same_size(reference, test)?;
     let bands = FrequencyBands::new(reference.size_px.x, FIELD_OF_VIEW_DEG);
-    let [reference, test] = [reference, test].map(Seen::new);
+    let [reference, test] = [reference, test].map(PerceivedImage::new);
     let pixels = (0..reference.ab.len()).into_par_iter();
     Ok(pixels.map(|index| fails(&reference, &test, &bands, index)).collect())
 }
 
 /// One image as the eye adapts to it.
-struct Seen {
+struct PerceivedImage {
     /// Luminance, cd/m², from sharp to smooth.
     pyramid: Vec<Plane>,
     /// (a*, b*).
     ab: Vec<Vec2>,
 }
 
-impl Seen {
+impl PerceivedImage {
     fn new(image: &View) -> Self {
         let space = WhiteRelative::new(ADOBE_RGB);
         let xyz: Vec<Vec3> = convert_pixels(
@@ -83,7 +83,7 @@ fn pyramid(luminance: Plane) -> Vec<Plane> {
 }
 
 /// True if a viewer sees a pixel differ.
-fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) -> bool {
+fn fails(reference: &PerceivedImage, test: &PerceivedImage, bands: &FrequencyBands, index: usize) -> bool {
     let level = bands.adaptation_level;
     let mean = (reference.luminance(level, index) + test.luminance(level, index)) / 2.0;
     let adaptation_cd_m2 = mean.max(DARKEST_CD_M2);
@@ -97,7 +97,7 @@ fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) ->
 }
 
 /// The contrast of a band: the stronger amplitude against the brighter background of two images.
-fn contrast(images: [&Seen; 2], index: usize, band: usize) -> f32 {
+fn contrast(images: [&PerceivedImage; 2], index: usize, band: usize) -> f32 {
     let amplitudes_cd_m2 = images.map(|seen| (seen.luminance(band, index) - seen.luminance(band + 1, index)).abs());
     let [a, b] = images.map(|seen| seen.luminance(band + 2, index).abs());
     amplitudes_cd_m2[0].max(amplitudes_cd_m2[1]) / a.max(b).max(DARKEST_CD_M2)

@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::Highlight;
-use gpu::{Binding, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, shader_variant, uniform_elements};
+use gpu::{Binding, DynamicUniforms, GpuError, PooledBuffer, ShaderVariant, shader_variant, uniform_elements};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
@@ -257,13 +257,13 @@ pub(crate) struct Land {
     set: SetVariant,
     /// The cell's images are those of single-pole cameras.
     single_pole: bool,
-    /// Of the cell's images, under the light of the view.
+    /// What the cell's images reflect, under the light of the view.
     reflection: Reflection,
 }
 
 impl ShaderVariant for Land {
     const TEMPLATE: &'static str = "bounce/land.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! { single_pole => self.single_pole, ..self.reflection.context(self.set) }
@@ -342,7 +342,7 @@ pub(crate) fn land(
         Binding::buffer("ray_color", ray_color),
         Binding::buffer("inverse_depth", inverse_depth),
         Binding::buffer("provenance", provenance),
-        // Before that of the cell's images.
+        // The first of a name counts: not the illumination of the cell's images.
         Binding::buffer("illumination", &view_reflectors.illumination),
     ];
     own.extend(bounces.cell_bindings(&rays));

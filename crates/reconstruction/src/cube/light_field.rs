@@ -53,7 +53,7 @@ impl GpuLightField {
 /// A light field, ready to be gathered in.
 pub(crate) struct LightField {
     pub own: wgpu::Buffer,
-    /// With their names in `cube/gather.wgsl`.
+    /// Tables with their names in `cube/gather.wgsl`.
     pub tables: [(&'static str, Table); 4],
 }
 

@@ -49,7 +49,7 @@ pub(crate) struct GpuCube {
 /// A layered depth cube, ready to be walked through.
 pub(crate) struct Cube {
     own: wgpu::Buffer,
-    /// With their names in shaders.
+    /// Tables with their names in shaders.
     tables: [(&'static str, Table); 5],
     /// A ray straight off a surface meets nothing nearer.
     pub start_m: f32,
@@ -70,9 +70,8 @@ impl Cube {
     ) -> Result<Self, ReconstructionError> {
         check(grid, images)?;
         let cells = grid.size.map(|side| side.div_ceil(8));
-        tables
-            .gpu
-            .check_table("cells of a layered cube", cells.to_array().map(|side| side as usize).iter().product())?;
+        let cell_count = cells.to_array().map(|side| side as usize).iter().product();
+        tables.gpu.check_table("cells of a layered cube", cell_count)?;
         let count: usize = images.iter().map(LayeredDepthImage::sample_count).sum();
         GpuError::check_limit("the samples of a layered cube", count as u64, MAX_SAMPLES as u64)?;
         tables.gpu.check_table("samples of a layered cube", count)?;

@@ -3,7 +3,7 @@
 pub(crate) mod march;
 pub(crate) mod smooth;
 
-use gpu::{ResourceTraits, ShaderVariant};
+use gpu::{DynamicUniforms, ShaderVariant};
 use minijinja::{Value, context};
 
 use self::march::{MARCHES, March};
@@ -34,7 +34,7 @@ pub(crate) struct Carve {
 
 impl ShaderVariant for Carve {
     const TEMPLATE: &'static str = "joint_carve.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! { stop_level => self.stop_level, bounced => self.bounced, ..self.set.context() }

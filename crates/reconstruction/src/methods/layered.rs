@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use depth_image::{Highlight, MAX_REFLECTIONS};
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use gpu::{Binding, DynamicUniforms, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, CellRays, RayLists};
@@ -31,7 +31,7 @@ pub(crate) enum Walked {
 impl Walked {
     const ALL: [Self; 5] = [Self::Pixels, Self::LeftPixels, Self::Bounced, Self::IntoLobes, Self::LeftBounced];
 
-    /// Of those that stand for all, the ways to light the lobes that the rays meet.
+    /// The ways to light the lobes that the rays meet.
     fn lobes(self) -> &'static [LobeLight] {
         match self {
             Self::Pixels => &LobeLight::ALL,
@@ -85,7 +85,7 @@ impl Walk {
 
 impl ShaderVariant for Walk {
     const TEMPLATE: &'static str = "layered.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! {

@@ -18,13 +18,13 @@ pub(crate) fn mesh(device: &Device, set: &SampleSet, cut: Cut, turn: Turn) -> Re
     if let Some(&(index, plane)) = missing {
         return Err(ReconstructionError::MissingPlane { index, plane });
     }
-    if let Some(mesh) = kept(&set.meshes.meshes.lock(), cut) {
+    if let Some(mesh) = mesh_of_cut(&set.meshes.meshes.lock(), cut) {
         return Ok(mesh);
     }
     // Not under the lock: a live view would wait for the turn of a batch.
     let mesh = Arc::new(build(device, set, cut, turn)?);
     let mut meshes = set.meshes.meshes.lock();
-    if let Some(mesh) = kept(&meshes, cut) {
+    if let Some(mesh) = mesh_of_cut(&meshes, cut) {
         return Ok(mesh);
     }
     if meshes.len() >= MAX_MESHES {
@@ -34,7 +34,7 @@ pub(crate) fn mesh(device: &Device, set: &SampleSet, cut: Cut, turn: Turn) -> Re
     Ok(mesh)
 }
 
-fn kept(meshes: &[Arc<Mesh>], cut: Cut) -> Option<Arc<Mesh>> {
+fn mesh_of_cut(meshes: &[Arc<Mesh>], cut: Cut) -> Option<Arc<Mesh>> {
     meshes.iter().find(|mesh| mesh.cut == cut).cloned()
 }
 

@@ -171,14 +171,14 @@ pub fn tile_starts_m(images: &[DepthImage], volume: &Aabb, camera: &PinholeCamer
 /// Images without the planes that the method needs give none.
 #[must_use]
 pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<Quad>> {
-    if !matches!(method, ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. }) {
-        return None;
+    let images = images.iter().enumerate();
+    match method {
+        ReconstructionMethod::Mesh => Some(images.flat_map(|(number, image)| mesh::quads(number, image)).collect()),
+        ReconstructionMethod::HybridMesh { merged } => {
+            Some(images.flat_map(|(number, image)| hybrid_mesh::quads(number, image, merged)).collect())
+        }
+        _ => None,
     }
-    let quads = images.iter().enumerate().flat_map(|(number, image)| match method {
-        ReconstructionMethod::HybridMesh { merged } => hybrid_mesh::quads(number, image, merged),
-        _ => mesh::quads(number, image),
-    });
-    Some(quads.collect())
 }
 
 /// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit. Images that do not prove all ways

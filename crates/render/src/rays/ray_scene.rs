@@ -56,7 +56,7 @@ const TABLES: [&str; 7] =
 
 /// Bound to shaders that trace rays.
 pub struct Traced {
-    /// In the order of [`TABLES`].
+    /// One for each of the variables [`TABLES`].
     tables: [Arc<Table>; 7],
     pub(crate) traversal: Traversal,
     /// The making of the tree.

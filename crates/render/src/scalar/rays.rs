@@ -15,9 +15,9 @@ use crate::rays::ray_scene::MATERIAL_TEXELS;
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
 
-/// The tables of a scene time on the host, with triangles in the order of the tree's leaves.
+/// The tables that a device has of a scene at one time, with triangles in the order of the tree's leaves.
 #[derive(Debug, Clone)]
-struct HostTables {
+pub struct Scene {
     nodes: Vec<CwBvhNode>,
     /// Corners, and their numbers with the triangle's flags.
     corners: Vec<[[u32; 4]; 3]>,
@@ -26,12 +26,6 @@ struct HostTables {
     details: Vec<FlatDetail>,
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
-}
-
-/// The tables that a device has of a scene at one time.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    tables: HostTables,
     /// The side of a pixel on a surface where a ray's parameter is 1: the size of cells of hashed alpha.
     pub footprint: f32,
 }
@@ -128,7 +122,7 @@ impl Scene {
         let rays = &scene.rays;
         let mut state = rays.state.lock();
         let bvh = &rays.moved_to(scene_time_s, &mut state)?.bvh;
-        let tables = HostTables {
+        Ok(Self {
             nodes: bvh.tree.nodes.clone(),
             corners: rays.corner_texels(bvh, &rays.corners_in_world(scene_time_s)),
             triangles: rays.triangles_of_leaves(bvh),
@@ -136,8 +130,8 @@ impl Scene {
             details: rays.flat.details_at(scene_time_s).into_owned(),
             materials: rays.materials.clone(),
             texels: rays.texels.clone(),
-        };
-        Ok(Self { tables, footprint: 0.0 })
+            footprint: 0.0,
+        })
     }
 
     /// The nearest triangle beyond `near`; backs of single-sided ones are not there.
@@ -175,7 +169,7 @@ impl Scene {
     /// The surface that a hit lies on.
     #[must_use]
     pub fn surface_id(&self, hit: &Hit) -> SurfaceId {
-        let FlatTriangle { instance, primitive, .. } = self.tables.triangles[hit.slot as usize];
+        let FlatTriangle { instance, primitive, .. } = self.triangles[hit.slot as usize];
         SurfaceId { instance, primitive }
     }
 
@@ -183,8 +177,8 @@ impl Scene {
     #[must_use]
     pub fn normal_in_world(&self, hit: &Hit) -> Vec3 {
         let [b, c] = hit.barycentric;
-        let corners = self.tables.corners[hit.slot as usize].map(|corner| corner[3] & !CORNER_FLAGS);
-        let normals = corners.map(|number| unit_from_oct16(self.tables.vertices[number as usize].normal_oct16));
+        let corners = self.corners[hit.slot as usize].map(|corner| corner[3] & !CORNER_FLAGS);
+        let normals = corners.map(|number| unit_from_oct16(self.vertices[number as usize].normal_oct16));
         let normal = normals[0] * (1.0 - b - c) + normals[1] * b + normals[2] * c;
         normal.normalize_or_zero() * if hit.front { 1.0 } else { -1.0 }
     }
@@ -192,15 +186,14 @@ impl Scene {
     /// The look of a triangle whose material has no textures.
     #[must_use]
     pub fn look(&self, hit: &Hit) -> Look {
-        let FlatTriangle { material, flags, .. } = self.tables.triangles[hit.slot as usize];
-        let [base, emission, coat, dielectric] = [0, 1, 2, 3].map(|part| {
-            Vec4::from(self.tables.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits))
-        });
+        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
+        let [base, emission, coat, dielectric] = [0, 1, 2, 3]
+            .map(|part| Vec4::from(self.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits)));
         let [metallic, roughness, ..] = coat.to_array();
         let numbers = self.numbers_of(hit);
         let shares = hit.shares();
         let vertex_linear = (0..3).map(|i| {
-            let [r, g, b, _] = self.tables.vertices[numbers[i]].color_srgba8;
+            let [r, g, b, _] = self.vertices[numbers[i]].color_srgba8;
             Vec3::from([r, g, b].map(linear_from_srgb8)) * shares[i]
         });
         let base_linear = base.truncate() * vertex_linear.sum::<Vec3>();
@@ -219,7 +212,7 @@ impl Scene {
     /// Mean curvature of a triangle's surface, by how its normal turns along the edges; positive where convex.
     pub(super) fn curvature_per_m(&self, hit: &Hit) -> f32 {
         let corners = self.corners_of(hit.slot);
-        let normals = self.numbers_of(hit).map(|number| unit_from_oct16(self.tables.vertices[number].normal_oct16));
+        let normals = self.numbers_of(hit).map(|number| unit_from_oct16(self.vertices[number].normal_oct16));
         let turns = (0..3).map(|i| {
             let edge = corners[(i + 1) % 3] - corners[i];
             let next = normals[(i + 1) % 3];
@@ -230,7 +223,7 @@ impl Scene {
 
     /// Corners of all triangles.
     pub fn triangles_in_world(&self) -> impl Iterator<Item = [Vec3; 3]> {
-        (0..self.tables.corners.len() as u32).map(|slot| self.corners_of(slot))
+        (0..self.corners.len() as u32).map(|slot| self.corners_of(slot))
     }
 
     /// Walks the tree front to back. `test` is asked about triangles with the greatest parameter that matters, and
@@ -245,7 +238,7 @@ impl Scene {
             if !rest.is_done() {
                 stack.push(rest);
             }
-            let node = &self.tables.nodes[child as usize];
+            let node = &self.nodes[child as usize];
             let hits = met_children(node, ray, t_max);
             todo = Todo { first_child: node.child_base_idx, hits: hits & 0xff00_0000 | u32::from(node.imask) };
             let mut triangles = hits & 0x00ff_ffff;
@@ -261,11 +254,11 @@ impl Scene {
     }
 
     fn corners_of(&self, slot: u32) -> [Vec3; 3] {
-        self.tables.corners[slot as usize].map(|[x, y, z, _]| Vec3::from([x, y, z].map(f32::from_bits)))
+        self.corners[slot as usize].map(|[x, y, z, _]| Vec3::from([x, y, z].map(f32::from_bits)))
     }
 
     fn has(&self, slot: u32, flag: u32) -> bool {
-        self.tables.corners[slot as usize][0][3] & flag != 0
+        self.corners[slot as usize][0][3] & flag != 0
     }
 
     fn crossing(&self, slot: u32, ray: &Traveller, t_max: f32) -> Option<Hit> {
@@ -292,39 +285,37 @@ impl Scene {
         if !self.has(hit.slot, ALPHA_TESTED) {
             return true;
         }
-        let FlatTriangle { material, flags, .. } = self.tables.triangles[hit.slot as usize];
+        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
         let material = (material * MATERIAL_TEXELS) as usize;
         let cutoff = if flags & ALPHA_HASHED != 0 {
-            let places = self.numbers_of(hit).map(|number| Vec3::from(self.tables.details[number].place_m));
+            let places = self.numbers_of(hit).map(|number| Vec3::from(self.details[number].place_m));
             let place_m = (0..3).map(|i| places[i] * hit.shares()[i]).sum();
             hashed_cutoff(place_m, hit.t * self.footprint)
         } else {
-            f32::from_bits(self.tables.materials[material + 1][3])
+            f32::from_bits(self.materials[material + 1][3])
         };
         self.alpha(material, hit) >= cutoff
     }
 
     /// Numbers of a triangle's vertices.
     fn numbers_of(&self, hit: &Hit) -> [usize; 3] {
-        self.tables.corners[hit.slot as usize].map(|corner| (corner[3] & !CORNER_FLAGS) as usize)
+        self.corners[hit.slot as usize].map(|corner| (corner[3] & !CORNER_FLAGS) as usize)
     }
 
     fn alpha(&self, material: usize, hit: &Hit) -> f32 {
         let numbers = self.numbers_of(hit);
         let shares = hit.shares();
-        let used = self.tables.materials[material + 2][3] & 31;
+        let used = self.materials[material + 2][3] & 31;
         let uvs = numbers.map(|number| {
             let second = used & 1 != 0;
-            Vec2::from(if second { self.tables.details[number].uv } else { self.tables.vertices[number].uv })
+            Vec2::from(if second { self.details[number].uv } else { self.vertices[number].uv })
         });
         let uv: Vec2 = (0..3).map(|i| uvs[i] * shares[i]).sum();
-        let alphas = numbers.map(|number| f32::from(self.tables.vertices[number].color_srgba8[3]) / 255.0);
+        let alphas = numbers.map(|number| f32::from(self.vertices[number].color_srgba8[3]) / 255.0);
         let vertex_alpha: f32 = (0..3).map(|i| alphas[i] * shares[i]).sum();
-        let [first, packed_size, ..] = self.tables.materials[material + 4];
+        let [first, packed_size, ..] = self.materials[material + 4];
         let wraps = [used >> 1 & 3, used >> 3 & 3];
-        f32::from_bits(self.tables.materials[material][3])
-            * vertex_alpha
-            * self.texture_alpha(first, packed_size, uv, wraps)
+        f32::from_bits(self.materials[material][3]) * vertex_alpha * self.texture_alpha(first, packed_size, uv, wraps)
     }
 
     /// Bilinear, of the finest level; 1 where there is no texture.
@@ -340,7 +331,7 @@ impl Scene {
         let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
             let x = texel_place(low.x as i32 + x, size.x, wraps[0]);
             let y = texel_place(low.y as i32 + y, size.y, wraps[1]);
-            f32::from(self.tables.texels[(first + y * size.x + x) as usize][3]) / 255.0
+            f32::from(self.texels[(first + y * size.x + x) as usize][3]) / 255.0
         });
         mix(mix(a, b, share.x), mix(c, d, share.x), share.y)
     }

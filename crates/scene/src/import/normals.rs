@@ -252,8 +252,9 @@ fn groups_by_position(positions: &[DVec3]) -> Vec<u32> {
     groups.collect()
 }
 
-/// Sets the tangents of all corners, as MikkTSpace has them (Mikkelsen 2008), with which normal maps are baked. Corners of one vertex whose tangents differ get separate vertices. The mesh has
-/// normals and details; `second_uv` says on which pair of coordinates the normal map lies.
+/// Sets the tangents of all corners, as MikkTSpace has them (Mikkelsen 2008), with which normal maps are baked. Corners of one
+/// vertex whose tangents differ get separate vertices. The mesh has normals and details; `second_uv` says on which pair of
+/// coordinates the normal map lies.
 pub(crate) fn generate_tangents(mesh: &mut SourceMesh, second_uv: bool) -> Result<(), Error> {
     let positions: Vec<[f32; 3]> = mesh.positions_in_mesh.iter().map(|p| p.as_vec3().to_array()).collect();
     let normals: Vec<[f32; 3]> = mesh.vertices.iter().map(|v| v.normal).collect();

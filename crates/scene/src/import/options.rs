@@ -1,4 +1,4 @@
-//! What is imported how: what the caller chooses, and what all readers share.
+//! Options of an import, and the state that the readers of all formats share.
 
 use std::fmt;
 use std::str::FromStr;

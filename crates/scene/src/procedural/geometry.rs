@@ -9,8 +9,8 @@ use crate::{Instance, Material, Mesh, MeshPart, Scene, Vertex};
 
 const LIGHT_CHECK: Vec3 = Vec3::splat(214.0);
 const DARK_CHECK: Vec3 = Vec3::new(54.0, 62.0, 74.0);
-/// The step to either side from which a normal is computed, radians.
-const STEP: f32 = 1e-3;
+/// The step to either side from which a normal is computed.
+const STEP_RAD: f32 = 1e-3;
 
 /// A place on a beam's axis: the middle of its section, and the direction of the section's top.
 #[derive(Clone, Copy)]
@@ -288,7 +288,7 @@ fn normal_of(point: &impl Fn(Vec3) -> Vec3, out: Vec3) -> Vec3 {
     let right = out.any_orthonormal_vector();
     let up = out.cross(right);
     let [to_right, upwards] = [right, up].map(|aside| {
-        let [ahead, behind] = [aside, -aside].map(|step| point((out + step * STEP).normalize_or(out)));
+        let [ahead, behind] = [aside, -aside].map(|step| point((out + step * STEP_RAD).normalize_or(out)));
         ahead - behind
     });
     to_right.cross(upwards).normalize_or(out)

@@ -1,6 +1,6 @@
 //! Marches in the image of one sample camera, then asks all cameras about the point found.
 
-use gpu::{ResourceTraits, ShaderVariant};
+use gpu::{DynamicUniforms, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -30,7 +30,7 @@ pub(crate) struct March {
 
 impl ShaderVariant for March {
     const TEMPLATE: &'static str = "joint_carve/march.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         context! { march_camera => self.camera, listed => self.listed, ..self.set.context() }

@@ -2,7 +2,7 @@
 
 use depth_image::Antialias;
 use glam::Vec2;
-use gpu::{ResourceTraits, ShaderVariant};
+use gpu::{DynamicUniforms, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -28,7 +28,7 @@ pub(crate) struct Smooth {
 
 impl ShaderVariant for Smooth {
     const TEMPLATE: &'static str = "joint_carve/smooth.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
 
     fn context(&self) -> Value {
         let offsets: Vec<[f32; 2]> = from_first_px(self.antialias).map(|offset| offset.to_array()).collect();

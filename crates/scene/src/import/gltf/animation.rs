@@ -54,9 +54,9 @@ impl Placements {
                 // A mesh without joints is rigid.
                 let skin = document.root.nodes[node.number].skin.filter(|_| !mesh.influences.is_empty());
                 if let Some(skin) = skin {
-                    let moving = skins.skinned(skin, mesh, node, place)?;
-                    instance.source_from_mesh = at_rest(tree, &moving.joints, &format!("skin {}", skin.value()))?;
-                    placements.moving.push(MovingInstance { instance: number as u32, ..moving });
+                    let (joints, influences) = skins.skinned(skin, mesh, node, place)?;
+                    instance.source_from_mesh = at_rest(tree, &joints, &format!("skin {}", skin.value()))?;
+                    placements.moving.push(MovingInstance { instance: number as u32, joints, influences });
                 } else if moves[place as usize] {
                     // A clip may grow what has no size at rest: only the place at rest is left.
                     let at_rest = &mut instance.source_from_mesh;
@@ -90,7 +90,7 @@ impl<'d> Skins<'d> {
         Self { document, place_in_tree, joints_left: document.limits.nodes, influences_left: document.limits.vertices }
     }
 
-    /// The joints of a skin and of each vertex of a mesh, for some instance of it. Vertices without weights follow the mesh's own node, which is then
+    /// The joints of a skin and of each vertex of a mesh. Vertices without weights follow the mesh's own node, which is then
     /// the last joint; `place` is its place in the tree.
     fn skinned(
         &mut self,
@@ -98,7 +98,7 @@ impl<'d> Skins<'d> {
         mesh: &SourceMesh,
         node: &PlacedNode,
         place: u32,
-    ) -> Result<MovingInstance, Fault> {
+    ) -> Result<(Vec<Joint>, Vec<Influence>), Fault> {
         let node = format!("node {}", node.number);
         let skin = self.document.root.get(index);
         let skin = skin.ok_or_else(|| Fault::malformed(&node, format!("skin {} does not exist", index.value())))?;
@@ -134,7 +134,7 @@ impl<'d> Skins<'d> {
         if is_rigid_somewhere {
             joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
         }
-        Ok(MovingInstance { instance: 0, joints, influences })
+        Ok((joints, influences))
     }
 }
 

@@ -1,4 +1,4 @@
-//! The older description of a surface.
+//! `KHR_materials_pbrSpecularGlossiness`.
 
 use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::Info;
