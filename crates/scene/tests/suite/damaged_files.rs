@@ -1,7 +1,6 @@
 //! Files that are truncated at every length, or have bytes changed at random, give a scene or an error, and no panic.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use fixtures::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
@@ -10,7 +9,7 @@ use crate::samples::compressed::{compressed_cube, diagonals, plain_streams, posi
 use crate::samples::draco::{cube_stream, draco_cube};
 use crate::samples::ktx2::{etc1s, uastc, uastc_of_encoder, zstandard};
 use crate::samples::skinned::Tube;
-use crate::samples::{self, GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
+use crate::samples::{self, GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary, within_a_second};
 
 /// Tight limits keep a changed size from making the test slow.
 fn limits() -> Limits {
@@ -102,18 +101,13 @@ fn load_damaged(name: &str, bytes: &[u8], changed: usize) {
     let path = dir.path().join(name);
     let mut loaded = 0;
     let mut refused = 0;
-    let mut slowest = Duration::ZERO;
     damaged(bytes, changed, |bytes| {
         rewrite(&path, bytes);
-        let start = Instant::now();
         match load(&path) {
             true => loaded += 1,
             false => refused += 1,
         }
-        slowest = slowest.max(start.elapsed());
     });
-    println!("{name}: {loaded} loaded, {refused} refused, slowest {slowest:?}");
-    assert!(slowest < Duration::from_secs(1), "{name}: {slowest:?}");
     assert!(refused > 100, "{name}: {loaded} loaded, {refused} refused");
 }
 
@@ -125,7 +119,8 @@ fn rewrite(path: &Path, bytes: &[u8]) {
 
 fn load(path: &Path) -> bool {
     let limits = limits();
-    load_file(path, &limits, MissingTextures::Refuse).map(|scene| scene.validate(&limits).unwrap()).is_ok()
+    let loaded = within_a_second(|| load_file(path, &limits, MissingTextures::Refuse));
+    loaded.map(|scene| scene.validate(&limits).unwrap()).is_ok()
 }
 
 #[test]
@@ -145,17 +140,12 @@ fn load_with_other_numbers(json: &str, binary: &[u8], least: u32) {
     let mut random = Random(11);
     let path = dir.path().join("a.glb");
     let mut loaded = 0;
-    let mut slowest = Duration::ZERO;
     for _ in 0..6000 {
         let json = with_other_numbers(json.as_bytes(), &mut random);
         rewrite(&path, &samples::glb(std::str::from_utf8(&json).unwrap(), binary));
-        let start = Instant::now();
         loaded += u32::from(load(&path));
-        slowest = slowest.max(start.elapsed());
     }
-    println!("{loaded} of 6000 loaded, slowest {slowest:?}");
     assert!((least..6000 - least).contains(&loaded), "{loaded}: both outcomes must be common, or this tests little");
-    assert!(slowest < Duration::from_secs(1), "{slowest:?}");
 }
 
 #[test]
@@ -177,15 +167,11 @@ fn damage_binary(cube: &GltfCube, changed: usize) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.glb");
     let mut loaded = 0;
-    let mut slowest = Duration::ZERO;
     damaged(&cube.binary, changed, |binary| {
         rewrite(&path, &samples::glb(&cube.json(), binary));
-        let start = Instant::now();
         loaded += u32::from(load(&path));
-        slowest = slowest.max(start.elapsed());
     });
-    println!("{loaded} loaded, slowest {slowest:?}");
-    assert!(loaded > 100 && slowest < Duration::from_secs(1), "{loaded} {slowest:?}");
+    assert!(loaded > 100, "{loaded} loaded");
 }
 
 #[test]

@@ -7,6 +7,7 @@ pub mod skinned;
 pub mod warnings;
 
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use scene::{Limits, MissingTextures, Scene, SceneError, load_file};
 use tempfile::TempDir;
@@ -58,11 +59,19 @@ pub fn load(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     Sample::new(name, bytes).load()
 }
 
+/// Does work that must end within a second. Programs beside it may stop it for longer: it has three tries.
+pub fn within_a_second<T>(mut work: impl FnMut() -> T) -> T {
+    let mut done_in_time = || {
+        let start = Instant::now();
+        let done = work();
+        (start.elapsed() < Duration::from_secs(1)).then_some(done)
+    };
+    (0..3).find_map(|_| done_in_time()).expect("three tries take a second and more")
+}
+
 /// The message of the error that loading must give within a second.
 pub fn refusal(name: &str, bytes: &[u8]) -> String {
-    let start = std::time::Instant::now();
-    let message = load(name, bytes).expect_err("it must be refused").to_string();
-    assert!(start.elapsed().as_secs_f32() < 1.0, "took {:?}: {message}", start.elapsed());
+    let message = within_a_second(|| load(name, bytes).expect_err("it must be refused").to_string());
     assert!(message.contains(name), "the file is not named: {message}");
     message
 }
