@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Starts the cluster of deploy/compose.yaml, waits until all services are healthy, and requests 24 views of each scene,
-# which must agree with direct rendering. With --test it also kills nodes while both scenes are watched, and then stops
-# the cluster.
+# which must agree with direct rendering. With --test images omit what others cover; it also kills nodes while both scenes are
+# watched, and then stops the cluster.
 #
 # The program is expected at target/release/myriorama, or at $MYRIORAMA.
 set -euo pipefail
@@ -63,6 +63,14 @@ views() {
     done
 }
 
+# Expensive light and few views: several nodes sample, each image without what others cover.
+sampled_by_several() {
+    "$program" view --coordinator "$coordinator" --scene "${scenes[0]}" --views 4 --policy pipeline \
+        --lighting 'soft 16, indirect 64' --compare --out out/cluster/sampled-by-several | tee out/cluster/plan.txt
+    grep -q 'sampled by K = [2-4] of 4 nodes' out/cluster/plan.txt
+    awk -F, '$1 == "worst" { found = $5 >= 30 } END { exit !found }' out/cluster/sampled-by-several/comparison.csv
+}
+
 # A viewer of scene $1 for 20 s, which may see no new picture for $2 seconds; its output is in $3.
 watch_scene() {
     "$program" view --coordinator "$coordinator" --scene "$1" --orbit 120 --size 160x120 --policy pipeline --live \
@@ -119,6 +127,7 @@ visit() {
 
 build
 if [ "${1:-}" = --test ]; then
+    export MYRIORAMA_SAMPLING=non_redundant:coverage
     trap 'compose down --timeout 15 --volumes' EXIT
 fi
 compose up --detach
@@ -126,6 +135,7 @@ wait_until_healthy "${services[@]}"
 views
 status
 if [ "${1:-}" = --test ]; then
+    sampled_by_several
     kill_while_served "${scenes[0]}" "${scenes[1]}"
     kill_while_served "${scenes[1]}" "${scenes[0]}"
     views

@@ -94,13 +94,13 @@ impl ReferenceViews {
 pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
     let work = SampleWork {
         scene_hash: setup.offer.hash.to_string(),
+        tile_count: 1,
         wanted: (0..setup.samples.len() as u32).collect(),
         cameras: setup.samples.iter().copied().map(Into::into).collect(),
         sampling: args.sampling().to_string(),
         planes: engine.sample_planes(&args.method().to_string())?,
         lighting: args.lighting.to_string(),
         scene_time_s: 0.0,
-        temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
         surfaces_by_rays: None,
     };

@@ -1,4 +1,5 @@
-//! `light_cache` in a cluster of several processes: its pictures, and those of a compositor's successor.
+//! `light_cache` in clusters of several processes, from samples without covered pixels of given cameras: its pictures, and those of
+//! nodes that sample alone or take over.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
@@ -6,6 +7,11 @@ use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
+
+use app_core::camera_record::{self, NamedCamera};
+use app_core::setup::SceneArgs;
+use glam::UVec2;
+use serde_json::Map;
 
 const NODES: usize = 3;
 /// Enough that a node still makes views when it is killed.
@@ -23,10 +29,24 @@ fn program(arguments: &[&str]) -> Command {
     program
 }
 
+/// Writes the sample cameras that the program would choose for the scene.
+fn write_cameras(path: &Path) {
+    let setup = SceneArgs::new("courtyard".parse().unwrap()).load().unwrap();
+    let named = setup.samples.into_iter().zip(0..);
+    let cameras = named.map(|(camera, number)| NamedCamera {
+        file_path: format!("{number}.png"),
+        camera: camera.resized(UVec2::new(96, 72)),
+        more: Map::new(),
+    });
+    camera_record::write(path, cameras.collect::<Vec<_>>(), setup.scene.source_space, Map::new()).unwrap();
+}
+
 impl Cluster {
-    fn start() -> Self {
-        let scene = ["--scene", "courtyard", "--lighting", "soft 4, occlusion 4"];
-        let arguments = [&["coordinator", "--listen", "127.0.0.1:0"], &scene[..]].concat();
+    fn start(cameras: &Path, node_count: usize) -> Self {
+        let scene =
+            ["--scene", "courtyard", "--lighting", "soft 4, occlusion 4", "--sampling", "non_redundant:coverage"];
+        let samples = ["--samples", cameras.to_str().unwrap()];
+        let arguments = [&["coordinator", "--listen", "127.0.0.1:0"], &scene[..], &samples].concat();
         let mut coordinator = program(&arguments).spawn().unwrap();
         let mut lines = BufReader::new(coordinator.stdout.take().unwrap()).lines().map(Result::unwrap);
         let line = lines.find(|line| line.contains("http://127.0.0.1:")).unwrap();
@@ -35,23 +55,23 @@ impl Cluster {
             let arguments = ["node", "--coordinator", &address, "--device", "software"];
             program(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
         };
-        let nodes = (0..NODES).map(node);
+        let nodes = (0..node_count).map(node);
         let processes = std::iter::once(coordinator).chain(nodes).collect();
         let cluster = Self { processes, address };
-        while !cluster.has_all_nodes() {
+        while !cluster.has_nodes(node_count) {
             std::thread::sleep(Duration::from_millis(100));
         }
         cluster
     }
 
-    fn has_all_nodes(&self) -> bool {
+    fn has_nodes(&self, count: usize) -> bool {
         let status = program(&["status", "--coordinator", &self.address]).output().unwrap();
-        String::from_utf8_lossy(&status.stdout).matches("node-").count() >= NODES
+        String::from_utf8_lossy(&status.stdout).matches("node-").count() >= count
     }
 
-    /// A request in which every node samples and makes views. Its method is that of traced light.
-    fn view(&self, folder: &Path, arguments: &[&str]) -> Command {
-        let mut view = program(&["view", "--coordinator", &self.address, "--policy", "time-share", "--size", "96x72"]);
+    /// A request whose method is that of traced light. In time-share every node samples and makes views.
+    fn view(&self, policy: &str, folder: &Path, arguments: &[&str]) -> Command {
+        let mut view = program(&["view", "--coordinator", &self.address, "--policy", policy, "--size", "96x72"]);
         view.args(["--provenance", "--out"]).arg(folder).args(arguments);
         view
     }
@@ -81,20 +101,34 @@ fn pictures(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn pictures_look_like_direct_ones_and_outlive_a_killed_node() {
-    let mut cluster = Cluster::start();
-    let folders = [(); 3].map(|()| tempfile::tempdir().unwrap());
-    let [compared, whole, disturbed] = folders.each_ref().map(tempfile::TempDir::path);
+    let folders = [(); 5].map(|()| tempfile::tempdir().unwrap());
+    let [compared, whole, disturbed, expensive, alone] = folders.each_ref().map(tempfile::TempDir::path);
+    let cameras = compared.join("samples.json");
+    write_cameras(&cameras);
+    let mut cluster = Cluster::start(&cameras, NODES);
     let against_direct = ["--orbit", "4", "--compare", "--quality", "fine"];
-    let text = succeeded(&cluster.view(compared, &against_direct).output().unwrap());
+    let text = succeeded(&cluster.view("time-share", compared, &against_direct).output().unwrap());
     assert!(text.contains("foreground PSNR"), "{text}");
     let rows = fs::read_to_string(compared.join("comparison.csv")).unwrap();
     let worst: Vec<&str> = rows.lines().last().unwrap().split(',').collect();
     assert!(worst[0] == "worst" && worst[4].parse::<f64>().unwrap() >= 36.0, "{rows}");
 
+    let few = ["--views", "2", "--lighting", "soft 16, indirect 64"];
+    let text = succeeded(&cluster.view("pipeline", expensive, &few).output().unwrap());
+    assert!(text.contains("sampled by K = 2 of 3 nodes"), "{text}");
+    let one = Cluster::start(&cameras, 1);
+    succeeded(&one.view("pipeline", alone, &few).output().unwrap());
+    drop(one);
+    let [by_three, by_one] = [expensive, alone].map(pictures);
+    assert_eq!((by_three.len(), by_one.len()), (4, 4), "colour and provenance");
+    for (one, other) in by_one.iter().zip(&by_three) {
+        assert!(fs::read(one).unwrap() == fs::read(other).unwrap(), "{} differs", other.display());
+    }
+
     let count = VIEWS.to_string();
     let many = ["--views", &count];
-    succeeded(&cluster.view(whole, &many).output().unwrap());
-    let mut view = cluster.view(disturbed, &many).spawn().unwrap();
+    succeeded(&cluster.view("time-share", whole, &many).output().unwrap());
+    let mut view = cluster.view("time-share", disturbed, &many).spawn().unwrap();
     while pictures(disturbed).is_empty() {
         std::thread::sleep(Duration::from_millis(2));
     }

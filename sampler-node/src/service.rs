@@ -72,7 +72,7 @@ impl SamplerService {
         let work = sample_work(plan, &indices, set_index)?;
         let node = self.node.clone();
         let scene = plan.workload.scene.clone();
-        let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
+        let own: Vec<_> = indices.iter().filter_map(|&tile| work.camera_of_tile(tile)).collect();
         let most_bytes = most_image_bytes(&plan.workload.illumination, &own);
         let key = (content, plan.tile_count, indices);
         let tiles = f64::from(plan.tile_count);
@@ -178,15 +178,13 @@ async fn send_chunks(
 /// The work of sampling a set.
 fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<SampleWork, Status> {
     let workload = &plan.workload;
-    let cameras = plan.sampled_cameras();
-    if indices.iter().any(|&index| index as usize >= cameras.len()) {
+    if indices.iter().any(|&index| index as usize >= plan.image_count()) {
         return Err(Status::internal("image_indices beyond the sample cameras"));
     }
     Ok(SampleWork {
-        cameras,
+        tile_count: plan.tile_count,
         wanted: indices.to_vec(),
         scene_time_s: workload.timeline.time_s(set_index).ok_or_else(|| beyond_timeline(set_index))?,
-        temporal_reference_s: workload.timeline.temporal_reference_s(set_index),
         refinement: workload.refinement(set_index),
         ..SampleWork::of(workload)
     })

@@ -482,8 +482,8 @@ impl Engine for ScalarEngine {
         self.loaded(&request.scene_hash)?;
         self.images_are_sequential(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
-        let cameras: Vec<&SampleCamera> =
-            request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
+        let cameras = request.wanted.iter().filter_map(|&tile| request.camera_of_tile(tile));
+        let cameras: Vec<SampleCamera> = cameras.collect();
         let eye = |camera: &SampleCamera| match camera {
             SampleCamera::Depth(camera) => camera.reference().eye_in_world.extend(camera.reference().principal_px.y),
             SampleCamera::Layered(camera) => camera.corner_in_world.extend(camera.world_from_camera.w),
@@ -493,7 +493,7 @@ impl Engine for ScalarEngine {
             let image = (eye(camera).to_array().map(f32::to_bits), request.scene_time_s.to_bits(), request.refinement);
             *self.counts.lock().entry(image).or_default() += 1;
         }
-        let is_held = |camera: &&SampleCamera, holds: &Holds| holds.eyes.contains(&eye(camera).truncate());
+        let is_held = |camera: &SampleCamera, holds: &Holds| holds.eyes.contains(&eye(camera).truncate());
         self.wait_while(|holds| cameras.iter().any(|camera| is_held(camera, holds)));
         let image = |camera: &SampleCamera| match camera {
             SampleCamera::Depth(camera) => {
@@ -506,7 +506,7 @@ impl Engine for ScalarEngine {
             SampleCamera::LightField(camera) => SampleImage::LightField(no_light(camera)),
         };
         sleep(self.pace().image * cameras.len() as u32);
-        Ok(cameras.into_iter().map(image).collect())
+        Ok(cameras.iter().map(image).collect())
     }
 
     fn upload(&self, set: &SampleSet, _: Turn) -> Result<SharedSet, EngineError> {

@@ -86,7 +86,8 @@ pub struct SceneArgs {
     pub method: Option<ReconstructionMethod>,
     /// The sampling method; `None` where the user names none
     #[arg(long, value_name = "NAME",
-        help = format!("Which samples are taken. {} [default: {}]", SamplingMethod::help(), SamplingMethod::default()))]
+        help = format!("Which samples are taken. {} [default: {}; {} where --lighting has indirect light]", SamplingMethod::help(),
+            SamplingMethod::default(), SamplingMethod::OF_INDIRECT_LIGHT))]
     pub sampling: Option<SamplingMethod>,
     /// Size of the sample images, or auto: as in --samples, or from a quarter to twice the pixels of 400x300, so that they
     /// are about twice as dense as each session's views
@@ -184,10 +185,10 @@ impl SceneArgs {
         }
     }
 
-    /// The sampling method.
+    /// The sampling method; without one, that for the light.
     #[must_use]
     pub fn sampling(&self) -> SamplingMethod {
-        self.sampling.unwrap_or_default()
+        self.sampling.unwrap_or_else(|| SamplingMethod::suited_to(self.lighting))
     }
 
     /// Loads the scene and places its sample cameras.

@@ -5,9 +5,6 @@ use serde::{Deserialize, Serialize};
 use crate::check::{InvalidField, within};
 use crate::limits::{MAX_SCENE_TIME_S, MAX_SETS};
 
-/// Sets in a row that share one temporal reference.
-const SETS_PER_REFERENCE: u32 = 16;
-
 /// Scene times of the sample sets.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Timeline {
@@ -30,14 +27,6 @@ impl Timeline {
     #[must_use]
     pub fn moves(&self) -> bool {
         self.step_s != 0.0 && self.set_count > 1
-    }
-
-    /// Scene time of the set's temporal reference: the first set of its run, whose samples the set keeps so that they do
-    /// not flicker. `None` for the reference itself, and where nothing moves.
-    #[must_use]
-    pub fn temporal_reference_s(&self, set_index: u32) -> Option<f32> {
-        let first = set_index - set_index % SETS_PER_REFERENCE;
-        (self.moves() && first != set_index).then(|| self.time_s(first)).flatten()
     }
 
     /// Scene time of a set; `None` beyond the last.

@@ -332,7 +332,6 @@ impl SetContent {
         let shown = (
             workload.scene.hash.as_str(),
             time_s,
-            workload.timeline.temporal_reference_s(set_index).unwrap_or(time_s),
             &workload.sampling,
             &workload.lighting,
             workload.planes,

@@ -182,8 +182,8 @@ impl GpuEngine {
         mirrored: Lighting,
         method: SamplingMethod,
     ) -> Result<Vec<SampleImage>, EngineError> {
-        let wanted = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize));
-        let images = wanted.map(|camera| match camera {
+        let wanted = request.wanted.iter().filter_map(|&tile| request.camera_of_tile(tile));
+        let images = wanted.map(|camera| match &camera {
             SampleCamera::Layered(camera) => {
                 let kept = method.layer_selection();
                 let kept = kept.ok_or_else(|| SamplingError::Cameras { method: method.to_string() })?;
@@ -332,10 +332,10 @@ impl Engine for GpuEngine {
         let work = sampling::SampleWork {
             draw,
             cameras: &cameras,
+            tile_count: request.tile_count,
             wanted: &request.wanted,
             method,
             planes: render::SamplePlanes { specular: true, normal, corners, light, ..Default::default() },
-            temporal_reference_s: request.temporal_reference_s,
         };
         let images = self.catching(|| self.sampler.sample(&work))?;
         Ok(images.into_iter().map(SampleImage::Depth).collect())

@@ -113,15 +113,15 @@ pub struct SampleWork {
     pub scene_hash: String,
     /// The cameras of the whole set, in its order: an image may depend on the cameras before its own.
     pub cameras: Vec<SampleCamera>,
-    /// Indices of the cameras to sample.
+    /// T: each image is cut into this many tiles, one above the other; 1 for whole images.
+    pub tile_count: u32,
+    /// The tiles to sample: those of image i are i · T to (i + 1) · T - 1.
     pub wanted: Vec<u32>,
     pub sampling: String,
     /// Planes beside colour and inverse depth.
     pub planes: SamplePlanes,
     pub lighting: String,
     pub scene_time_s: f32,
-    /// Scene time of the temporal reference, for sampling methods with temporal hysteresis.
-    pub temporal_reference_s: Option<f32>,
     /// How far the light is refined. Any step may be asked for first, or alone.
     pub refinement: Refinement,
     /// Whether surfaces are found by rays or drawn; `None`: whichever this node measured to be faster.
@@ -136,15 +136,24 @@ impl SampleWork {
         Self {
             scene_hash: workload.scene.hash.to_string(),
             cameras: workload.sample_cameras.clone(),
+            tile_count: 1,
             wanted: (0..workload.sample_cameras.len() as u32).collect(),
             sampling: workload.sampling.clone(),
             planes: workload.planes,
             lighting: workload.lighting.clone(),
             scene_time_s: workload.timeline.start_s as f32,
-            temporal_reference_s: None,
             refinement: Refinement::default(),
             surfaces_by_rays: pixel_count.and_then(|pixels| workload.finds_surfaces_by_rays(pixels)),
         }
+    }
+}
+
+impl SampleWork {
+    /// The camera of a tile; `None` beyond the last.
+    #[must_use]
+    pub fn camera_of_tile(&self, tile: u32) -> Option<SampleCamera> {
+        let camera = self.cameras.get((tile / self.tile_count) as usize)?;
+        Some(camera.tile(tile % self.tile_count, self.tile_count))
     }
 }
 

@@ -249,26 +249,24 @@ impl Measurement<'_> {
         images.iter().map(|image| encode_sample_image(image).map_err(codec)).collect()
     }
 
-    /// Images, and their time. Where images are tileable, one row of the first builds all shaders: a set whose light is expensive is
+    /// Images, and their time. Where images are tileable, one row of the last builds all shaders: a set whose light is expensive is
     /// then sampled once.
     fn sampled_timed(&self, work: &SampleWork, is_tileable: bool) -> Result<(Vec<EncodedImage>, f64), Status> {
-        let Some(first) = work.cameras.first().copied().filter(|_| is_tileable) else {
+        let Some(row) = one_row(work).filter(|_| is_tileable) else {
             return self.timed(|| self.sampled(work));
         };
-        let row = first.tile(0, first.size_px().y);
-        self.sampled(&SampleWork { cameras: vec![row], wanted: vec![0], ..work.clone() })?;
+        self.sampled(&row)?;
         self.timed_warm(|| self.sampled(work))
     }
 
     /// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height.
     /// Each quarter is of another image, since images differ. Images of too few rows are not tileable.
     fn tile_costs(&self, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, Status> {
-        let Some(first) = whole.cameras.first().copied() else { return Ok(None) };
+        let Some(row) = one_row(whole) else { return Ok(None) };
         if whole.cameras.iter().any(|camera| (camera.size_px().y as usize) < ROW_PARTS) {
             return Ok(None);
         }
-        let tile_s = |camera: SampleCamera| {
-            let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
+        let tile_s = |work: SampleWork| {
             // Whole images have built the shaders, and what takes long varies little.
             if sample_image_s > LONG_RUN_S {
                 let (sampled, own_s) = own_time(self.engine, || self.sampled(&work));
@@ -276,10 +274,11 @@ impl Measurement<'_> {
             }
             Ok::<f64, Status>(self.timed(|| self.sampled(&work))?.1)
         };
-        let row_s = tile_s(first.tile(0, first.size_px().y))?;
+        let row_s = tile_s(row)?;
         let mut quarters_s = [0.0; ROW_PARTS];
-        for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
-            quarters_s[quarter] = tile_s(camera.tile(quarter as u32, ROW_PARTS as u32))?;
+        for (quarter, quarter_s) in quarters_s.iter_mut().enumerate() {
+            let wanted = vec![(quarter % whole.cameras.len() * ROW_PARTS + quarter) as u32];
+            *quarter_s = tile_s(SampleWork { tile_count: ROW_PARTS as u32, wanted, ..whole.clone() })?;
         }
         Ok(split_into_overhead_and_shares(sample_image_s, row_s, quarters_s))
     }
@@ -359,6 +358,13 @@ fn split_into_overhead_and_shares(sample_image_s: f64, row_s: f64, quarters_s: [
 
 fn codec(error: impl Display) -> Status {
     Status::internal(format!("codec: {error}"))
+}
+
+/// The first row of the last image: where images depend on those before them, its time has theirs. `None` without images.
+fn one_row(work: &SampleWork) -> Option<SampleWork> {
+    let rows = work.cameras.last()?.size_px().y;
+    let last = work.cameras.len() as u32 - 1;
+    Some(SampleWork { tile_count: rows, wanted: vec![last * rows], ..work.clone() })
 }
 
 /// Views and the cost of one of them, by `make` for a number of views: as many, up to `most`, as time allows. Fixed costs

@@ -111,11 +111,13 @@ impl Engine for Sleeper {
     fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<SampleImage>, EngineError> {
         let mut calls = self.calls.lock().unwrap();
         calls.refinements.push(request.refinement);
-        calls.sampled_px.extend(request.cameras.iter().map(SampleCamera::size_px));
-        let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
-        let texels: usize = request.cameras.iter().map(SampleCamera::pixel_count).sum();
+        let cameras = request.wanted.iter().filter_map(|&tile| request.camera_of_tile(tile));
+        let cameras: Vec<SampleCamera> = cameras.collect();
+        calls.sampled_px.extend(cameras.iter().map(SampleCamera::size_px));
+        let parts_s: f64 = cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
+        let texels: usize = cameras.iter().map(SampleCamera::pixel_count).sum();
         std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s + self.texel_s * texels as f64));
-        Ok(request.cameras.iter().map(image).collect())
+        Ok(cameras.iter().map(image).collect())
     }
 
     fn upload(&self, set: &SampleSet, _: Turn) -> Result<SharedSet, EngineError> {

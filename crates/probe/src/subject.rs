@@ -90,12 +90,12 @@ impl Subject {
         Ok(SampleWork {
             scene_hash: self.scene_hash.clone(),
             cameras: of.sample_cameras.iter().copied().map(SampleCamera::Depth).collect(),
+            tile_count: 1,
             wanted: (0..of.sample_cameras.len() as u32).collect(),
             sampling: of.sampling.clone(),
             planes: engine.sample_planes(&of.method)?,
             lighting: self.lighting(light).to_owned(),
             scene_time_s: self.scene_time_s,
-            temporal_reference_s: None,
             refinement: Refinement::default(),
             surfaces_by_rays: None,
         })

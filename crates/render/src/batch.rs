@@ -12,7 +12,12 @@ use gpu::{
 use crate::accumulation::Sums;
 use crate::pixel_camera::{PixelCamera, uniform};
 use crate::{RenderError, rays::Traced, work::DrawWork};
-use crate::{known_samples::ImageSequence, light_samples::CachedLight, pieces::Piece, planes::Output};
+use crate::{
+    known_samples::ImageSequence,
+    light_samples::{CachedLight, CoveredBy},
+    pieces::Piece,
+    planes::Output,
+};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
@@ -38,6 +43,8 @@ pub(crate) struct Batch<'a> {
     /// of the output.
     pub tone: ToneMapping,
     pub sequence: Option<ImageSequence<'a>>,
+    /// The images before, which cover pixels of sample images.
+    pub covered_by: Option<CoveredBy<'a>>,
     /// Light that is looked up before rays are traced.
     pub cached: Option<CachedLight<'a>>,
     /// The position within the pixels.
@@ -85,7 +92,18 @@ impl<'a> Batch<'a> {
     pub fn new(work: DrawWork<'a>, output: Output) -> Self {
         let position = Position::default();
         let tone = ToneMapping::NONE;
-        Self { work, cameras: &[], by_rays: false, traced: None, output, tone, sequence: None, cached: None, position }
+        Self {
+            work,
+            cameras: &[],
+            by_rays: false,
+            traced: None,
+            output,
+            tone,
+            sequence: None,
+            covered_by: None,
+            cached: None,
+            position,
+        }
     }
 
     /// All positions within the pixels, and the cameras whose pixels' centres are there. The centre of a depth image comes first;
@@ -141,7 +159,9 @@ impl<'a> Batch<'a> {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
         // The samples of a sequence's image depend on all cameras of its set, and on its place among them.
         let set = self.sequence.map(|sequence| (&sequence.known.cameras, sequence.known.variant(sequence.first)));
-        format!("{:?}", (scene.identity, lighting, scene_time_s, set, self.cameras, self.by_rays, self.output))
+        let covered_by = self.covered_by.map(|set| (set.surfaces.cameras(), &set.numbers[set.first..]));
+        let of_set = (set, covered_by);
+        format!("{:?}", (scene.identity, lighting, scene_time_s, of_set, self.cameras, self.by_rays, self.output))
     }
 
     /// The family of the passes over pixels, whose costs are learned.

@@ -1,7 +1,5 @@
 //! Surface and light to finished planes: a view's colour and depth, or those of a depth image.
 
-use std::collections::HashSet;
-
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Antialias, Highlight};
 use gpu::{Binding, BufferPool, Gpu, GpuTone, PooledBuffer, ShaderVariant, highlight_name, switches};
@@ -9,11 +7,8 @@ use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use crate::batch::{Batch, Recording};
-use crate::known_samples::view_cell_m;
 use crate::planes::{Output, PlaneLayout};
-use crate::{
-    RenderError, lamp_shares::GpuLampShares, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
-};
+use crate::{RenderError, lamp_shares::GpuLampShares, sums::SumPlanes, surfaces::Surfaces};
 
 /// Inverse depths within a texel differ by this share at most where they are of one surface.
 pub const SAME_SURFACE: f32 = 0.005;
@@ -22,11 +17,10 @@ pub const SAME_SURFACE: f32 = 0.005;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuFinish {
-    pub view_cell_m: f32,
+    pub tone: GpuTone,
     pub position: u32,
     pub position_count: u32,
-    pub padding: u32,
-    pub tone: GpuTone,
+    pub padding: [u32; 2],
     pub shares: GpuLampShares,
 }
 
@@ -50,14 +44,6 @@ impl Finish {
         let lit = batch.work.lighting.is_lit();
         let environment_map = batch.work.scene.environment.is_some();
         Self { by_rays: batch.by_rays, single_pole: batch.is_single_pole(), lit, environment_map, output }
-    }
-
-    /// The variants with each usefulness test.
-    pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
-        let useful: HashSet<_> = tests.iter().map(|test| test.usefulness).filter(Option::is_some).collect();
-        useful
-            .into_iter()
-            .flat_map(|usefulness_test| Self::of_images(Output { passed: true, usefulness_test, ..Output::default() }))
     }
 
     fn of_images(output: Output) -> impl Iterator<Item = Self> {
@@ -87,14 +73,15 @@ impl ShaderVariant for Finish {
 
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, lit, environment_map, output } = *self;
-        let Output { sums, samples, mirrors, glossy, passed: redundancy, usefulness_test, .. } = output;
+        let Output { sums, samples, mirrors, glossy, passed: redundancy, .. } = output;
         let PlaneLayout { normal, reflector, surface_id, passed, light, count, .. } = output.layout();
         context! {
-            by_rays, single_pole, lit, environment_map, samples, mirrors, glossy, redundancy, usefulness_test,
+            by_rays, single_pole, lit, environment_map, samples, mirrors, glossy, redundancy,
             highlight => output.highlight.map(highlight_name),
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
             averaged => output.antialias > Antialias::NONE, plane_count => count,
+            covered => output.covered,
             light => light.is_some(), light_plane => light, share_words => output.share_words(),
             ..sums.context()
         }
@@ -114,7 +101,9 @@ impl ShaderVariant for Finish {
         }
         let light = Output { light: true, ..plain };
         let passed = [Output { passed: true, ..plain }, Output { passed: true, ..light }];
-        let images = [plain, Output { antialias: Antialias::MOST, ..plain }, light].into_iter().chain(passed);
+        let covered = [plain, light].map(|output| Output { covered: true, ..output });
+        let images =
+            [plain, Output { antialias: Antialias::MOST, ..plain }, light].into_iter().chain(covered).chain(passed);
         // Views have one eye.
         let bent = Self::of_images(plain).filter(|variant| variant.by_rays);
         let bent = bent.map(|variant| Self { single_pole: true, ..variant });
@@ -126,7 +115,8 @@ impl ShaderVariant for Finish {
 pub(crate) struct Planes {
     pub words: PooledBuffer,
     position_sums: Option<PooledBuffer>,
-    /// The pixels whose light is that of their first position, where light is looked up.
+    /// The pixels whose light is that of their first position, where light is looked up; or those of sample images that keep their
+    /// samples.
     kept: Option<PooledBuffer>,
 }
 
@@ -140,7 +130,8 @@ impl Planes {
         gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes)?;
         let sums = is_averaged.then(|| pool.lend_storage("sums of positions", sum_bytes.max(4)));
         let shares_light = is_averaged && batch.cached.is_some();
-        let kept = shares_light.then(|| pool.lend_storage("kept light", batch.bytes(1).max(4)));
+        let kept =
+            (shares_light || batch.output.covered).then(|| pool.lend_storage("kept light", batch.bytes(1).max(4)));
         Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums, kept })
     }
 
@@ -161,11 +152,10 @@ pub(crate) fn record(
     let batch = recording.batch;
     let variant = Finish::of(batch);
     let finish = GpuFinish {
-        view_cell_m: batch.sequence.map_or(0.0, |sequence| view_cell_m(&sequence.known.cameras)),
+        tone: batch.tone.into(),
         position: batch.position.number,
         position_count: batch.output.antialias.samples(),
-        padding: 0,
-        tone: batch.tone.into(),
+        padding: [0; 2],
         shares: batch.work.scene.lamp_shares,
     };
     let finish = recording.gpu.buffer_with("finish", &[finish], BufferUsages::UNIFORM);

@@ -38,17 +38,18 @@
 // The reversed depth of the nearest surface on each pixel's ray, redundant or not.
 @group(0) var front_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
 {% endif %}
+{% if covered %}
+// 1 for pixels that keep their samples.
+@group(0) var<storage, read> kept: array<u32>;
+{% endif %}
 {% include "sums.wgsl" %}
 {% include "lamp_shares.wgsl" %}
 
 // The position within the pixels, of so many. One beyond them is the centre: it gives depth, and no colour.
-struct Finish { view_cell_m: f32, position: u32, position_count: u32, tone: Tone, shares: LampShares }
+struct Finish { tone: Tone, position: u32, position_count: u32, shares: LampShares }
 {% if redundancy %}
 
 fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
-{% endif %}
-{% if usefulness_test %}
-{% include usefulness_test %}
 {% endif %}
 
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
@@ -138,11 +139,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let depth = reversed_depth_at(pixel);
     let surface = surface_at(pixel);
     var met = depth > 0.0;
+{% if covered %}
+    let is_hole = met && kept[camera.first_word / {{ plane_count }}u + place] == 0u;
+    met = met && !is_hole;
+{% endif %}
 {% if redundancy %}
     let front = front_at(pixel);
-{% if usefulness_test %}
-    for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(pixel, depth, front); }
-{% endif %}
 {% endif %}
 {% if light %}    put_light(pixel, place, met);
 {% else %}{% include "shaded.wgsl" %}
@@ -175,6 +177,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endif %}
 {% if redundancy %}
     put_depth_behind(place, depth, front, met);
+{% elif covered %}
+    put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, is_hole)));
 {% else %}
     put(1u, place, bitcast<u32>(depth / camera.near_m));
 {% endif %}

@@ -1,22 +1,16 @@
 //! The samples that images of a set hold, for tests of the redundancy of later ones (`known_samples.wgsl`).
 
-use std::{collections::HashSet, sync::Arc};
-
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
-use glam::{DMat4, DVec4, UVec2, Vec2};
+use glam::{DMat4, DVec4, UVec2};
 use gpu::{Binding, Gpu, GpuError, Lent, Pool};
 use minijinja::{Value, context};
 use wgpu::{BufferUsages, TextureFormat, TextureView};
 
 use crate::layers::{LayerKind, Layers};
-use crate::pixel_camera::PixelCamera;
 use crate::redundancy_test::{Evidence, RedundancyTest};
 use crate::surfaces::SURFACE_ID_FORMAT;
 
-/// A sample of the temporal reference is the same as a candidate within this many footprints: a steep surface may change its
-/// depth more from texel to texel.
-pub const REFERENCE_FOOTPRINTS: f32 = 4.0;
 /// Cosine of the most grazing angle at which a footprint still grows (`footprint.wgsl`).
 pub const LEAST_FACING: f32 = 0.01;
 
@@ -26,20 +20,16 @@ pub const LEAST_FACING: f32 = 0.01;
 pub(crate) struct KnownCamera {
     pub homogeneous_pixel_from_own: [[f32; 4]; 3],
     pub eye_in_world: [f32; 3],
-    pub footprint: f32,
-    pub column_in_world: [f32; 3],
-    pub columns: f32,
-    pub row_in_world: [f32; 3],
-    pub rows: f32,
     pub near_m: f32,
-    pub padding: [f32; 3],
+    pub columns: f32,
+    pub rows: f32,
+    pub padding: [f32; 2],
 }
 
 /// The switches of `known_samples.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct RedundancyVariant {
     test: RedundancyTest,
-    temporal_reference: bool,
     /// Images before.
     earlier: usize,
 }
@@ -48,16 +38,7 @@ pub(crate) struct RedundancyVariant {
 pub(crate) struct KnownSamples {
     pub cameras: Vec<PinholeCamera>,
     pub test: RedundancyTest,
-    layers: Arc<Lent<LayerKind, Layers>>,
-    /// Another moment of the same set.
-    reference: Option<TemporalReference>,
-}
-
-/// The samples of all images of a set at one moment, for the same images at another.
-#[derive(Clone)]
-pub struct TemporalReference {
-    cameras: Vec<PinholeCamera>,
-    layers: Arc<Lent<LayerKind, Layers>>,
+    layers: Lent<LayerKind, Layers>,
 }
 
 /// The images of a set that are drawn one after the other; each omits the samples that those before it hold.
@@ -76,21 +57,12 @@ pub(crate) struct Predecessors {
     pub variant: RedundancyVariant,
     samples: TextureView,
     cameras: wgpu::Buffer,
-    reference: Option<(TextureView, wgpu::Buffer)>,
 }
 
 impl RedundancyVariant {
-    /// Each test after few and many images, with a temporal reference where samples are consulted.
-    pub fn all(tests: &[RedundancyTest]) -> HashSet<Self> {
-        let mut all = HashSet::new();
-        for test in tests {
-            for earlier in [1, 3, 15] {
-                for temporal_reference in [false, test.consults == Evidence::Samples] {
-                    all.insert(Self { test: *test, temporal_reference, earlier });
-                }
-            }
-        }
-        all
+    /// Each test after few and many images.
+    pub fn all(tests: &[RedundancyTest]) -> Vec<Self> {
+        tests.iter().flat_map(|&test| [1, 3, 15].map(|earlier| Self { test, earlier })).collect()
     }
 
     /// The values of `known_samples.wgsl`, whose resources are in `group`.
@@ -98,7 +70,6 @@ impl RedundancyVariant {
         context! {
             redundancy_test => variant.map(|variant| variant.test.shader),
             test_traces_rays => variant.is_some_and(|variant| variant.test.traces_rays()),
-            temporal_reference => variant.is_some_and(|variant| variant.temporal_reference),
             earlier => variant.map_or(0, |variant| variant.earlier),
             known_group => group,
         }
@@ -112,7 +83,6 @@ impl KnownSamples {
         pool: &Pool<LayerKind, Layers>,
         cameras: &[PinholeCamera],
         test: RedundancyTest,
-        reference: Option<&TemporalReference>,
     ) -> Result<Self, GpuError> {
         let limits = &gpu.device.limits();
         GpuError::check_limit("images of a set", cameras.len() as u64, limits.max_texture_array_layers.into())?;
@@ -121,34 +91,25 @@ impl KnownSamples {
         let largest = cameras.iter().map(|camera| camera.size_px).fold(UVec2::ONE, UVec2::max);
         let size_px = if test.traces_rays() { UVec2::ONE } else { largest };
         let by_id = test.consults == Evidence::SurfaceIds;
-        let format = if by_id { SURFACE_ID_FORMAT } else { TextureFormat::Rgba32Uint };
+        let format = if by_id { SURFACE_ID_FORMAT } else { TextureFormat::R32Uint };
         let size = [size_px.x, size_px.y, cameras.len().max(1) as u32];
         Ok(Self {
             cameras: cameras.to_vec(),
             test,
-            layers: Arc::new(pool.lend((size, format), |&(size, format)| Layers::new(gpu, size, format))),
-            reference: reference.cloned(),
+            layers: pool.lend((size, format), |&(size, format)| Layers::new(gpu, size, format)),
         })
-    }
-
-    /// All images' samples, once they are drawn.
-    pub fn into_reference(self) -> TemporalReference {
-        TemporalReference { cameras: self.cameras, layers: self.layers }
     }
 
     /// The switches of tests for an image after `earlier` others.
     pub fn variant(&self, earlier: usize) -> RedundancyVariant {
-        RedundancyVariant { test: self.test, temporal_reference: self.reference.is_some(), earlier }
+        RedundancyVariant { test: self.test, earlier }
     }
 
     /// The first `earlier` images, for the next one, whose camera is `own`.
     pub fn predecessors(&self, gpu: &Gpu, earlier: usize, own: &PinholeCamera) -> Predecessors {
-        let reference = self.reference.as_ref().map(|TemporalReference { cameras, layers }| {
-            (layers.first(cameras.len()), KnownCamera::uniform(gpu, &cameras[earlier..=earlier], own))
-        });
         let samples = self.layers.first(earlier);
         let cameras = KnownCamera::uniform(gpu, &self.cameras[..earlier], own);
-        Predecessors { variant: self.variant(earlier), samples, cameras, reference }
+        Predecessors { variant: self.variant(earlier), samples, cameras }
     }
 }
 
@@ -169,13 +130,8 @@ impl<'a> ImageSequence<'a> {
 
 impl Predecessors {
     /// The variables of `known_samples.wgsl`.
-    pub fn bindings(&self) -> Vec<Binding<'_>> {
-        let mut bindings =
-            vec![Binding::texture("known_samples", &self.samples), Binding::buffer("known_cameras", &self.cameras)];
-        bindings.extend(self.reference.iter().flat_map(|(samples, camera)| {
-            [Binding::texture("reference_samples", samples), Binding::buffer("reference_camera", camera)]
-        }));
-        bindings
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::texture("known_samples", &self.samples), Binding::buffer("known_cameras", &self.cameras)]
     }
 }
 
@@ -187,18 +143,14 @@ impl KnownCamera {
 
     /// `own` is the camera of the image that consults this one.
     fn of(camera: &PinholeCamera, own: &PinholeCamera) -> Self {
-        let rays = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
         let [columns, rows] = camera.size_px.as_vec2().to_array();
         Self {
             homogeneous_pixel_from_own: homogeneous_pixel_from_own(camera, own),
-            eye_in_world: rays.eye_in_world,
-            footprint: rays.footprint,
-            column_in_world: rays.column_in_world,
+            eye_in_world: camera.eye_in_world.to_array(),
+            near_m: camera.near_m,
             columns,
-            row_in_world: rays.row_in_world,
             rows,
-            near_m: rays.near_m,
-            ..Self::zeroed()
+            padding: [0.0; 2],
         }
     }
 }
@@ -212,11 +164,4 @@ fn homogeneous_pixel_from_own(camera: &PinholeCamera, own: &PinholeCamera) -> [[
     });
     let rows = (camera_from_world * own_from_world.inverse()).transpose();
     [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.as_vec4().to_array())
-}
-
-/// The greatest distance between two of the viewpoints: the size of the cell that views are asked for in.
-#[must_use]
-pub fn view_cell_m(cameras: &[PinholeCamera]) -> f32 {
-    let pairs = cameras.iter().flat_map(|a| cameras.iter().map(|b| a.eye_in_world.distance(b.eye_in_world)));
-    pairs.fold(0.0, f32::max)
 }

@@ -6,14 +6,9 @@ struct KnownCamera {
     // the planar depth in metres.
     homogeneous_pixel_from_own: array<vec4f, 3>,
     eye_in_world: vec3f,
-    // A pixel's side at a depth of one metre.
-    footprint: f32,
-    // From one pixel's direction to the next one's, at a depth of one metre.
-    column_in_world: vec3f,
-    columns: f32,
-    row_in_world: vec3f,
-    rows: f32,
     near_m: f32,
+    columns: f32,
+    rows: f32,
 }
 
 // A sample that the image would show.
@@ -22,13 +17,10 @@ struct Candidate {
     homogeneous_pixel: vec4f,
     point_in_world: vec3f,
     reversed_depth: f32,
-    normal: vec3f,
     // A pixel's length on the surface, in metres.
     footprint_m: f32,
     id: vec2u,
     pixel: vec2u,
-    // The temporal reference of this image holds it, too: then it stays unless it is clearly redundant.
-    was_kept: bool,
 }
 
 // A layer for each camera, with texels as the test wants them.
@@ -55,26 +47,9 @@ fn nearest_texel(camera: KnownCamera, homogeneous: vec3f) -> vec2u {
     return vec2u(clamp(at, vec2f(0.0), vec2f(camera.columns, camera.rows) - 1.0));
 }
 
-{% if temporal_reference %}
-// The samples of this set at its reference time, and this image's camera then.
-@group({{ known_group }}) var reference_samples: texture_2d_array<u32>;
-@group({{ known_group }}) var<uniform> reference_camera: KnownCamera;
-
-fn was_kept(candidate: Candidate) -> bool {
-    let p = homogeneous_in(reference_camera, candidate);
-    let held = textureLoad(reference_samples, nearest_texel(reference_camera, p), {{ earlier }}, 0);
-    let depth_m = 1.0 / max(bitcast<f32>(held.x), 1e-30);
-    // Stretched footprints: a steep surface may change its depth more from texel to texel.
-    let room = REFERENCE_FOOTPRINTS * max(bitcast<f32>(held.y), candidate.footprint_m);
-    return is_in_view(reference_camera, p) && held.x != 0u && abs(depth_m - p.z) < room;
-}
-{% endif %}
 {% include redundancy_test %}
 
-fn is_redundant(found: Candidate) -> bool {
-    var candidate = found;
-{% if temporal_reference %}    candidate.was_kept = was_kept(found);
-{% endif %}
+fn is_redundant(candidate: Candidate) -> bool {
     var redundant = false;
 {% if test_traces_rays %}
     for (var number = 0u; number < {{ earlier }}u && !redundant; number++) {

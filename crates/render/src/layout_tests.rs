@@ -27,7 +27,7 @@ const NEVER: &str = "fn is_redundant_with(c: Candidate, number: u32, camera: Kno
 
 /// A test that finds nothing redundant.
 const TEST: RedundancyTest =
-    RedundancyTest { shader: "never.wgsl", consults: Evidence::Samples, from_one_place: false, usefulness: None };
+    RedundancyTest { shader: "never.wgsl", consults: Evidence::Samples, from_one_place: false };
 
 fn test_templates() -> Templates {
     templates(&[(TEST.shader, NEVER)]).expect("templates")
@@ -107,17 +107,7 @@ fn structs_of_draws_have_the_wgsl_layout() {
 
 #[test]
 fn a_known_camera_has_the_wgsl_layout() {
-    let host = host!(KnownCamera {
-        homogeneous_pixel_from_own,
-        eye_in_world,
-        footprint,
-        column_in_world,
-        columns,
-        row_in_world,
-        rows,
-        near_m,
-        padding
-    });
+    let host = host!(KnownCamera { homogeneous_pixel_from_own, eye_in_world, near_m, columns, rows, padding });
     assert_eq!(shader(&raster(), "KnownCamera"), host);
 }
 
@@ -188,7 +178,7 @@ fn a_lobe_has_the_wgsl_layout() {
 
 #[test]
 fn the_finish_and_its_tone_have_the_wgsl_layout() {
-    let finish = host!(GpuFinish { view_cell_m, position, position_count, padding, tone, shares });
+    let finish = host!(GpuFinish { tone, position, position_count, padding, shares });
     let GpuTone { exposure_factor: _, curve: _, padding: _ } = GpuTone::zeroed();
     let offsets = [offset_of!(GpuTone, exposure_factor), offset_of!(GpuTone, curve), offset_of!(GpuTone, padding)];
     for variant in Finish::all() {
@@ -218,7 +208,7 @@ fn the_light_cache_has_the_wgsl_layout() {
         padding
     });
     assert_eq!(shader(&module, "CacheCamera"), camera);
-    let cache = host!(GpuCache { shares, tests, cameras });
+    let cache = host!(GpuCache { shares, tests, camera_count, padding, cameras });
     assert_eq!(shader(&module, "Cache"), cache);
     let tests = host!(LookUpTests { least_coverage, plane_footprints, least_cosine, most_difference });
     assert_eq!(shader(&module, "LookUpTests"), tests);
@@ -266,8 +256,6 @@ const BOUND: &[&str] = &[
     "next",
     "next_bounces",
     "position_sums",
-    "reference_camera",
-    "reference_samples",
     "reflected",
     "reversed_depth",
     "samples",

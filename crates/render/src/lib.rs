@@ -9,6 +9,7 @@
 mod accumulation;
 mod batch;
 mod cluster;
+mod coverage;
 mod error;
 mod few_cores;
 mod finish;
@@ -48,7 +49,6 @@ mod work;
 pub use depth_image::Refinement;
 pub use error::RenderError;
 pub use gpu_scene::GpuScene;
-pub use known_samples::{TemporalReference, view_cell_m};
 pub use light_samples::LightCache;
 pub use lighting::{Ambient, Direct, Lighting, MAX_RAYS, UnknownLighting};
 pub use rays::AccelerationReport;

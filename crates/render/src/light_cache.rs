@@ -134,7 +134,7 @@ fn dispatch(
 ) -> Result<(), RenderError> {
     let scene = recording.batch.work.scene;
     let Picture { camera, target, planes, lists, asked } = picture;
-    let uniform = cache.uniform(recording.gpu, scene, tests, &recording.batch.cameras[camera]);
+    let uniform = cache.uniform(recording.gpu, scene, tests, cache.images.len(), &recording.batch.cameras[camera]);
     let is_asked = variant.positions == Positions::Asked;
     for (place, piece) in recording.pieces_of(camera).into_iter().enumerate() {
         let asked = asked.get(place).filter(|_| is_asked);

@@ -12,48 +12,9 @@
 {% include "light.wgsl" %}
 {% include "surfaces.wgsl" %}
 {% include "lamp_shares.wgsl" %}
-
-// A sample image.
-struct CacheCamera {
-    // Takes a place, from the view's eye, to (column · w, row · w, w); w is planar depth.
-    homogeneous_texel_from_offset: array<vec4f, 3>,
-    // From the view's eye.
-    eye_offset: vec3f,
-    // A texel's side on a surface that faces the camera, in metres at a depth of one metre.
-    footprint: f32,
-    // World direction of a texel = column · x + row · y + corner; its parameter is planar depth in metres.
-    column_in_world: vec3f,
-    // The number of its first sample in the table.
-    first_sample: u32,
-    row_in_world: vec3f,
-    // Half a step of the stored inverse depth.
-    half_step_per_m: f32,
-    corner_in_world: vec3f,
-    near_m: f32,
-    size_px: vec2u,
-}
-
-// When samples know the light of a point.
-struct LookUpTests {
-    // The coverage by one image's texels from which light is known.
-    least_coverage: f32,
-    // From the plane of a texel's triangle, at most.
-    plane_footprints: f32,
-    // Between normals of triangles, at least.
-    least_cosine: f32,
-    // Between the luminances of texels, at most, relative to the greatest.
-    most_difference: f32,
-}
-
-struct Cache { shares: LampShares, tests: LookUpTests, cameras: array<CacheCamera, MAX_CACHE_CAMERAS> }
+{% include "cached_texels.wgsl" %}
 
 @group(0) var<uniform> illumination: Illumination;
-@group(0) var<uniform> cache: Cache;
-// Texels of a sample: inverse depth, the normals of its triangle and of shading, light of lamps; light of the environment, and
-// packed shares.
-@group(0) var samples: texture_2d<u32>;
-// Of the view.
-@group(0) var triangle_normals: texture_2d<u32>;
 @group(0) var<storage, read_write> sums: array<f32>;
 {% include "pixel_list.wgsl" %}
 {%- if provenance_plane %}
@@ -73,8 +34,6 @@ struct Asked { workgroups: u32, y: u32, z: u32, count: u32, last_count: u32 }
 {%- endif %}
 {% include "sums.wgsl" %}
 
-// Texels of a sample in the table.
-const SAMPLE_TEXELS: u32 = {{ sample_texels }}u;
 // Texels near the border of an image count less, within this distance.
 const BORDER_PX: f32 = 2.0;
 const GRAZING_SHARE: f32 = 0.02;
@@ -89,15 +48,6 @@ const ALIKE_TRIANGLES: f32 = 0.98;
 const ALIKE_NORMALS: f32 = 0.9995;
 const ALIKE_FOOTPRINTS: f32 = 0.1;
 {%- endif %}
-
-struct Point {
-    // From the view's eye.
-    offset: vec3f,
-    normal: vec3f,
-    normal_oct16: u32,
-    triangle_normal: vec3f,
-    footprint_m: f32,
-}
 
 // Sums over texels by their weights.
 struct CachedLight {
@@ -178,41 +128,6 @@ fn expected_of_environment(normal: vec3f) -> f32 {
 
 fn ratio_of(here: f32, there: f32) -> f32 { return clamp(here / max(there, 1e-6), 0.0, MOST_RATIO); }
 
-// A texel of an image: where its sample is in the table, and its bilinear weight, 0 where it does not count.
-struct Texel { first: u32, weight: f32, words: vec4u }
-
-// A point as seen from an image's eye, and the first of the texels around its place with its direction. `along_normal` is the
-// offset's share along the point's normal.
-struct Sight { offset: vec3f, along_normal: f32, direction: vec3f }
-
-// A vector along an octahedral unit vector, of another length: a root less.
-fn along_oct16(packed: u32) -> vec3f {
-    let flat = unpack2x16snorm(packed);
-    let z = 1.0 - abs(flat.x) - abs(flat.y);
-    return vec3f(select(flat, oct_wrapped(flat), z < 0.0), z);
-}
-
-// `half_step` is half a step of the stored inverse depth times the depth of the point: times the depth of the texel it is what the
-// step moves the texel along its direction.
-fn texel_beside(sight: Sight, first: u32, direction: vec3f, weight: f32, point: Point, plane_m: f32, half_step: f32) -> Texel {
-    let words = textureLoad(samples, texel_at(first), 0);
-    let inverse_depth_per_m = bitcast<f32>(words.x);
-    let depth_m = 1.0 / max(inverse_depth_per_m, 1e-30);
-    let normal = along_oct16(words.y);
-    let squared = dot(normal, normal);
-    let cosine = dot(normal, point.triangle_normal);
-    let along_texel = dot(normal, direction);
-    let along_point = dot(point.triangle_normal, direction);
-    let from_texel_m = dot(normal, sight.offset) - depth_m * along_texel;
-    let from_point_m = sight.along_normal - depth_m * along_point;
-    let step_m = half_step * depth_m;
-    let is_turned_alike = cosine > 0.0 && cosine * cosine >= cache.tests.least_cosine * cache.tests.least_cosine * squared;
-    let is_in_plane = abs(from_texel_m) <= plane_m * sqrt(squared) + step_m * abs(along_texel)
-        && abs(from_point_m) <= plane_m + step_m * abs(along_point);
-    let counts = inverse_depth_per_m > 0.0 && is_turned_alike && is_in_plane;
-    return Texel(first, select(0.0, weight, counts), words);
-}
-
 // What the four texels around a point's place in an image say of it. Branches, and no loops that pass once as elsewhere: most points
 // are seen by most images, and the software device keeps in memory what a loop changes.
 fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, Known>) {
@@ -238,10 +153,7 @@ fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, K
         let lower = (image.first_sample + second.y * image.size_px.x) * SAMPLE_TEXELS;
         let left = first.x * SAMPLE_TEXELS;
         let right = second.x * SAMPLE_TEXELS;
-        let sight = Sight(
-            offset, dot(point.triangle_normal, offset),
-            image.column_in_world * center.x + image.row_in_world * center.y + image.corner_in_world,
-        );
+        let sight = sight_of(image, point, center);
         let texel_m = depth_m * image.footprint;
         let plane_m = cache.tests.plane_footprints * max(texel_m, point.footprint_m);
         let half_step = image.half_step_per_m * depth_m;
@@ -361,13 +273,6 @@ fn leave_to_rays(light: CachedLight, place: u32) {
     }
 {%- endif %}
     list_pixel(place);
-}
-
-fn point_at(pixel: vec2u, planar_depth_m: f32, surface: vec4u) -> Point {
-    return Point(
-        direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z), surface.z,
-        unit_from_oct16(textureLoad(triangle_normals, pixel, 0).x), planar_depth_m * camera.footprint,
-    );
 }
 
 // Writes the light of a point, or lists its pixel; gives its provenance.

@@ -36,6 +36,23 @@ pub(crate) struct CachedLight<'a> {
     pub tests: LookUpTests,
 }
 
+/// The surfaces of a set, whose images omit what those before them cover.
+#[derive(Clone, Copy)]
+pub(crate) struct CoveredBy<'a> {
+    /// The surfaces of the images, without light.
+    pub surfaces: &'a LightCache,
+    /// Places in the set of the images to be drawn, and which of them is the batch's first.
+    pub numbers: &'a [u32],
+    pub first: usize,
+}
+
+impl CoveredBy<'_> {
+    /// The place in its set of an image of the batch.
+    pub fn number(&self, place: usize) -> usize {
+        self.numbers[self.first + place] as usize
+    }
+}
+
 /// `LookUpTests` of the shader, those of one quality: when samples know the light of a point.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -69,10 +86,22 @@ pub(crate) struct GpuCacheCamera {
 pub(crate) struct GpuCache {
     pub shares: GpuLampShares,
     pub tests: LookUpTests,
+    pub camera_count: u32,
+    pub padding: [u32; 3],
     pub cameras: [GpuCacheCamera; MAX_CACHE_CAMERAS as usize],
 }
 
 impl LookUpTests {
+    /// Those of `fast`: a point is known among texels of its surface.
+    pub fn surrounded() -> Self {
+        Self {
+            least_coverage: 0.75,
+            plane_footprints: 0.25,
+            least_cosine: 23_f32.to_radians().cos(),
+            most_difference: f32::MAX,
+        }
+    }
+
     /// `None` where no sample is asked.
     pub fn new(quality: LightCacheQuality) -> Option<Self> {
         let any = Self {
@@ -81,8 +110,7 @@ impl LookUpTests {
             least_cosine: 30_f32.to_radians().cos(),
             most_difference: f32::MAX,
         };
-        let surrounded =
-            Self { least_coverage: 0.75, plane_footprints: 0.25, least_cosine: 23_f32.to_radians().cos(), ..any };
+        let surrounded = Self::surrounded();
         match quality {
             LightCacheQuality::Draft => Some(any),
             LightCacheQuality::Fast => Some(surrounded),
@@ -146,13 +174,26 @@ impl LightCache {
         Ok(Self { samples, images: cached, share_words })
     }
 
-    /// The uniform of a view.
-    pub(crate) fn uniform(&self, gpu: &Gpu, scene: &GpuScene, tests: LookUpTests, view: &Camera) -> Buffer {
+    /// The cameras of the images.
+    pub(crate) fn cameras(&self) -> Vec<PinholeCamera> {
+        self.images.iter().map(|image| image.camera).collect()
+    }
+
+    /// The uniform of a view that consults the first `count` images.
+    pub(crate) fn uniform(
+        &self,
+        gpu: &Gpu,
+        scene: &GpuScene,
+        tests: LookUpTests,
+        count: usize,
+        view: &Camera,
+    ) -> Buffer {
         let mut cameras = [GpuCacheCamera::zeroed(); MAX_CACHE_CAMERAS as usize];
-        for (camera, image) in cameras.iter_mut().zip(&self.images) {
+        for (camera, image) in cameras.iter_mut().zip(&self.images[..count]) {
             *camera = image.seen_from(view.reference().eye_in_world);
         }
-        let cache = GpuCache { shares: scene.lamp_shares, tests, cameras };
+        let shares = scene.lamp_shares;
+        let cache = GpuCache { shares, tests, camera_count: count as u32, padding: [0; 3], cameras };
         gpu.buffer_with("light cache", &[cache], BufferUsages::UNIFORM)
     }
 }

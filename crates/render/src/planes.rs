@@ -33,10 +33,10 @@ pub(crate) struct Output {
     pub light: bool,
     /// Views say where the light of each pixel is from.
     pub provenance: bool,
+    /// Whether pixels that other images cover are holes.
+    pub covered: bool,
     /// Whether redundant surfaces lie before the sample.
     pub passed: bool,
-    /// The template of the test that samples behind redundant ones must pass.
-    pub usefulness_test: Option<&'static str>,
 }
 
 /// The places of planes among those of a camera, after colour (0) and inverse depth (1).

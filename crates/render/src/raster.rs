@@ -162,7 +162,7 @@ impl Raster {
         let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
         let cameras = &batch.cameras[first..][..surfaces.len()];
         let of_pinholes = cameras.iter().map(|camera| RasterCamera::of(camera.reference(), batch.work.scene_time_s));
-        let groups = self.groups(scene, shown, of_pinholes, predecessors.map(Predecessors::bindings))?;
+        let groups = self.groups(scene, shown, of_pinholes, predecessors.map(|images| images.bindings().to_vec()))?;
         let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {

@@ -145,8 +145,8 @@ fn candidate_at(in: Varyings, normal: vec3f, primitive: u32) -> Candidate {
     let depth_m = camera.near_m / in.clip.z;
     let sight = in.position_in_world - camera.eye_in_world;
     return Candidate(
-        vec4f(in.clip.xy * depth_m, depth_m, 1.0), in.position_in_world, in.clip.z, normal, stretched_footprint(depth_m, camera.footprint, normal, sight),
-        vec2u(object.instance, in.first_primitive + primitive), vec2u(in.clip.xy), false,
+        vec4f(in.clip.xy * depth_m, depth_m, 1.0), in.position_in_world, in.clip.z, stretched_footprint(depth_m, camera.footprint, normal, sight),
+        vec2u(object.instance, in.first_primitive + primitive), vec2u(in.clip.xy),
     );
 }
 {% endif %}

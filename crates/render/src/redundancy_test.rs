@@ -9,9 +9,6 @@ pub struct RedundancyTest {
     pub consults: Evidence,
     /// Whether all images have one camera, so that pixels are compared with the same pixel.
     pub from_one_place: bool,
-    /// The template of `fn is_useful(pixel: vec2u, depth: f32, blocker: f32) -> bool`, for samples behind redundant ones at
-    /// `blocker`, where such samples are not always shown; both depths are reversed.
-    pub usefulness: Option<&'static str>,
 }
 
 /// The evidence of redundancy.
@@ -21,7 +18,7 @@ pub enum Evidence {
     Scene,
     /// The triangle at each texel of the images before: instance and primitive, all bits set where there is none.
     SurfaceIds,
-    /// The depth, normal and coarseness of each sample of the images before (`keep.wgsl`).
+    /// The depth of each sample of the images before (`keep.wgsl`).
     Samples,
 }
 

@@ -11,9 +11,9 @@ use gpu::{Gpu, GpuError, Pool, TablePool, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
-use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
+use crate::known_samples::{ImageSequence, KnownSamples};
 use crate::layered;
-use crate::light_samples::{CachedLight, LightCache, LookUpTests};
+use crate::light_samples::{CachedLight, CoveredBy, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
@@ -147,6 +147,33 @@ impl Renderer {
         self.images(work, cameras, planes, None, [None; 2])
     }
 
+    /// As [`Renderer::draw_depth_images`] for images of a set, but pixels become holes whose light views find in an image before: where
+    /// the four texels around the places of all points within a pixel lie on the same surface, as in [`Renderer::draw_cached_views`],
+    /// and are not coarser by more than half. Only the surfaces of other images are drawn. `numbers` are the places in the set of
+    /// the images of `cameras`, which may show parts of them.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_depth_images`]; cameras that are no pinholes, or more than 16.
+    pub fn draw_uncovered_images(
+        &self,
+        work: DrawWork<'_>,
+        set: &[Camera],
+        numbers: &[u32],
+        cameras: &[Camera],
+        planes: SamplePlanes,
+    ) -> Result<Vec<DepthImage>, RenderError> {
+        let before = numbers.iter().max().map_or(0, |&number| number as usize);
+        if before == 0 {
+            return self.draw_depth_images(work, cameras, planes);
+        }
+        let of_surfaces = SamplePlanes { light: true, ..SamplePlanes::default() };
+        let surfaces = self.draw_depth_images(work.unlit(), &set[..before], of_surfaces)?;
+        let surfaces = LightCache::upload(&self.tables, &surfaces, 0, work.turn)?;
+        self.check(cameras)?;
+        let planes = SamplePlanes { antialias: Antialias::NONE, ..planes };
+        self.images(work, cameras, planes, Some(CoveredBy { surfaces: &surfaces, numbers, first: 0 }), [None; 2])
+    }
+
     /// All surfaces on the lines of a parallel camera, whichever lies before another. A camera's lines are drawn in one pass, in
     /// bands of rows where they meet more than the device's buffers hold.
     ///
@@ -182,9 +209,6 @@ impl Renderer {
     /// redundant with images before it, and shows what lies behind. Surfaces that its rays passed are in
     /// [`DepthImage::passed`]; a texel with redundant surfaces and nothing behind them is a hole.
     ///
-    /// With a temporal reference, a test that consults samples has hysteresis: samples of the reference are redundant only by
-    /// a margin.
-    ///
     /// # Errors
     /// As [`Renderer::draw_depth_images`]; more images than the device's layers.
     pub fn draw_image_sequence(
@@ -194,42 +218,21 @@ impl Renderer {
         wanted: &[u32],
         planes: SamplePlanes,
         test: RedundancyTest,
-        reference: Option<&TemporalReference>,
     ) -> Result<Vec<DepthImage>, RenderError> {
         let all = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
         let own: Vec<Camera> = wanted.iter().map(|&number| cameras[number as usize]).collect();
-        let samples = KnownSamples::of(&self.gpu, &self.layers, &all, test, reference)?;
+        let samples = KnownSamples::of(&self.gpu, &self.layers, &all, test)?;
         let sequence = ImageSequence { known: &samples, wanted, first: 0, kept: all.len().saturating_sub(1) };
         // Where pixels are compared with the same pixel, corners are compared with corners.
         let corners = (planes.corners && test.from_one_place).then(|| corner_cameras(&all));
-        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layers, &cameras, test, None));
+        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layers, &cameras, test));
         let corners = corners.transpose()?;
         let of_corners = match &corners {
             Some(known) => ImageSequence { known, ..sequence },
             None => ImageSequence { kept: 0, ..sequence },
         };
-        self.images(work, &own, planes, Some(test), [Some(sequence), Some(of_corners)])
-    }
-
-    /// The samples of all images of a set, for a test that consults them.
-    ///
-    /// # Errors
-    /// As [`Renderer::draw_image_sequence`].
-    pub fn temporal_reference(
-        &self,
-        work: DrawWork<'_>,
-        cameras: &[Camera],
-        test: RedundancyTest,
-    ) -> Result<TemporalReference, RenderError> {
-        let work = work.unlit();
-        let pinholes = pinholes(cameras, "redundancy tests")?;
-        self.check(cameras)?;
-        let known = KnownSamples::of(&self.gpu, &self.layers, &pinholes, test, None)?;
-        let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let sequence = ImageSequence { known: &known, wanted: &wanted, first: 0, kept: cameras.len() };
-        self.images(work, cameras, SamplePlanes::default(), Some(test), [Some(sequence), None])?;
-        Ok(known.into_reference())
+        self.images(work, &own, planes, None, [Some(sequence), Some(of_corners)])
     }
 
     /// Depth images. Depths at texels' corners are pictures of their own, without light.
@@ -238,17 +241,20 @@ impl Renderer {
         work: DrawWork<'_>,
         cameras: &[Camera],
         planes: SamplePlanes,
-        test: Option<RedundancyTest>,
+        covered_by: Option<CoveredBy<'_>>,
         [sequence, of_corners]: [Option<ImageSequence<'_>>; 2],
     ) -> Result<Vec<DepthImage>, RenderError> {
         let corners = planes.corners.then(|| pinholes(cameras, "depths at corners")).transpose()?;
-        let output = images_output(work, planes, test);
-        let request = Batch { sequence, ..Batch::new(work, output) };
+        let covered = covered_by.is_some();
+        let triangle_normal = planes.light || covered;
+        let passed = sequence.is_some();
+        let output = Output { covered, triangle_normal, passed, ..images_output(work, planes) };
+        let request = Batch { sequence, covered_by, ..Batch::new(work, output) };
         let mut images = self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
             let cameras = as_cameras(&corner_cameras(&pinholes));
             self.check(&cameras)?;
-            let corners = self.images(work.unlit(), &cameras, SamplePlanes::default(), test, [of_corners, None])?;
+            let corners = self.images(work.unlit(), &cameras, SamplePlanes::default(), None, [of_corners, None])?;
             for (image, corners) in images.iter_mut().zip(corners) {
                 image.corner_inverse_depth_per_m = Some(corners.inverse_depth_per_m);
             }
@@ -266,7 +272,8 @@ impl Renderer {
         let mut pictures = Vec::with_capacity(cameras.len());
         for cameras in batches(cameras, self.most_pixels(request.output)) {
             let sequence = request.sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
-            let batch = self.batch(Batch { sequence, ..request.clone() }, cameras)?;
+            let covered_by = request.covered_by.map(|set| CoveredBy { first: pictures.len(), ..set });
+            let batch = self.batch(Batch { sequence, covered_by, ..request.clone() }, cameras)?;
             let (result, words) = self.stages.draw(&batch)?;
             result.with(words, |words: &[u32]| pictures.extend(read(words, cameras)))?;
         }
@@ -422,7 +429,7 @@ fn views_output(work: DrawWork<'_>) -> Output {
     Output { highlight, mirrors, glossy, ..Output::of(work, highlight.is_some()) }
 }
 
-fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<RedundancyTest>) -> Output {
+fn images_output(work: DrawWork<'_>, planes: SamplePlanes) -> Output {
     let reflector = planes.specular && work.highlight().is_some() && !planes.light;
     let is_centre_alone = work.refinement.steps > 1 || planes.light;
     Output {
@@ -431,10 +438,7 @@ fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<Redundan
         normal: planes.normal || reflector || planes.light,
         reflector,
         surface_id: planes.surface_id,
-        triangle_normal: planes.light,
         light: planes.light,
-        passed: test.is_some(),
-        usefulness_test: test.and_then(|test| test.usefulness),
         ..Output::of(work, reflector || planes.light)
     }
 }

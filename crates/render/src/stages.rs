@@ -13,7 +13,7 @@ use crate::light_cache::{self, Picture};
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
 use crate::surfaces::{MOST_FREE_BYTES, SurfaceKind, SurfaceViews, Surfaces};
-use crate::{RenderError, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
+use crate::{RenderError, coverage, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
 
 /// Batches of one class that are under way at once: each holds memory for its surfaces, light and planes.
@@ -174,6 +174,19 @@ impl Stages {
     ) -> Result<Vec<PixelList>, RenderError> {
         let batch = recording.batch;
         let mut all = Vec::new();
+        if let Some(covered_by) = batch.covered_by {
+            let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
+            for (camera, target) in surfaces.iter().enumerate() {
+                let lists = self.lists(recording, camera);
+                let picture = Picture { camera, target, planes, lists: &lists, asked: &[] };
+                coverage::record(recording, covered_by, picture)?;
+                if batch.work.lighting.is_lit() {
+                    illuminate::record(recording, &parts, camera, slice::from_ref(target), Some(&lists))?;
+                }
+                all.extend(lists);
+            }
+            return Ok(all);
+        }
         if !batch.work.lighting.is_lit() || !batch.has_color() && !batch.output.provenance {
             return Ok(all);
         }

@@ -7,7 +7,6 @@ mod mirrors;
 mod rig;
 mod sampler;
 pub mod scalar;
-mod temporal_hysteresis;
 mod work;
 
 pub use error::SamplingError;

@@ -10,14 +10,25 @@ use crate::methods::SamplingMethod;
 pub struct SampleWork<'a> {
     /// The scene, its moment and its light.
     pub draw: DrawWork<'a>,
-    /// The cameras of the whole set: a later image depends on those before it.
+    /// The cameras of the whole set: a later image may depend on those before it.
     pub cameras: &'a [Camera],
-    /// The images that are taken. Images in sequence are taken all together.
+    /// T: each image is cut into this many tiles, one above the other; 1 for whole images.
+    pub tile_count: u32,
+    /// The tiles that are taken: those of image i are i · T to (i + 1) · T - 1. Images in sequence are taken all together, and whole.
     pub wanted: &'a [u32],
     /// The choice of samples.
     pub method: SamplingMethod,
     /// Planes beside colour and depth.
     pub planes: SamplePlanes,
-    /// The moment of the temporal reference, where the method has hysteresis.
-    pub temporal_reference_s: Option<f32>,
+}
+
+impl SampleWork<'_> {
+    /// The cameras of the wanted tiles, and the places in the set of their images.
+    pub(crate) fn tiles(&self) -> (Vec<Camera>, Vec<u32>) {
+        let tiles = self.wanted.iter().map(|wanted| {
+            let number = wanted / self.tile_count;
+            (self.cameras[number as usize].tile(wanted % self.tile_count, self.tile_count), number)
+        });
+        tiles.unzip()
+    }
 }

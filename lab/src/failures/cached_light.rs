@@ -9,6 +9,7 @@ use depth_image::{
 use fixtures::{quad, unit_cube};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, LightCache, Lighting, SamplePlanes, Visibility};
+use sampling::{SampleWork, SamplingMethod};
 use scene::{Instance, Scene};
 
 use super::measures::{depths, is_kind, mean};
@@ -107,18 +108,31 @@ impl<'s> LitScene<'s> {
 
     /// Samples of light. They hold no reflections: what mirrors show is each view's own.
     pub fn samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
-        self.draw_samples(cameras, SamplePlanes { light: true, ..SamplePlanes::default() })
+        self.samples_by(SamplingMethod::CONVENTIONAL, cameras)
+    }
+
+    /// Samples of light by any method.
+    pub fn samples_by(&self, sampling: SamplingMethod, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
+        self.draw_samples(sampling, cameras, SamplePlanes { light: true, ..SamplePlanes::default() })
     }
 
     /// Samples of colour, for methods that make views from images alone.
     pub fn color_samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
-        self.draw_samples(cameras, SamplePlanes::default())
+        self.draw_samples(SamplingMethod::CONVENTIONAL, cameras, SamplePlanes::default())
     }
 
-    fn draw_samples(&self, cameras: &[PinholeCamera], planes: SamplePlanes) -> anyhow::Result<Vec<DepthImage>> {
+    fn draw_samples(
+        &self,
+        method: SamplingMethod,
+        cameras: &[PinholeCamera],
+        planes: SamplePlanes,
+    ) -> anyhow::Result<Vec<DepthImage>> {
         let lighting = self.lighting.without_reflections().unwrap_or(self.lighting);
-        let work = DrawWork { lighting, ..self.work() };
-        Ok(self.stand.engine().renderer.draw_depth_images(work, &pinholes(cameras), planes)?)
+        let draw = DrawWork { lighting, ..self.work() };
+        let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
+        let cameras = &pinholes(cameras);
+        let work = SampleWork { draw, cameras, tile_count: 1, wanted: &wanted, method, planes };
+        Ok(self.stand.sampler().sample(&work)?)
     }
 
     pub fn views(&self, cameras: &[PinholeCamera], planes: ViewPlanes) -> anyhow::Result<Vec<View>> {

@@ -35,6 +35,10 @@ impl Stand {
         &self.engine
     }
 
+    pub fn sampler(&self) -> &Sampler {
+        &self.sampler
+    }
+
     pub fn reconstructor(&self) -> &Reconstructor {
         &self.engine.reconstructor
     }
@@ -77,10 +81,10 @@ impl Stand {
             // By rays, which the test by visibility needs.
             draw: DrawWork { visibility: Visibility::Rays, ..work(scene, Lighting::UNLIT) },
             cameras: &pinholes(cameras),
+            tile_count: 1,
             wanted: &wanted,
             method,
             planes: SamplePlanes { normal: true, surface_id: true, ..SamplePlanes::default() },
-            temporal_reference_s: None,
         };
         Ok(self.sampler.sample(&work)?)
     }

@@ -14,7 +14,7 @@ use report::{Bar, Check, Report};
 use super::light::{DIRECT_RAYS, Light, LightRays};
 use super::measure::{LightFront, LightRow, LitRows};
 use super::report::add_to;
-use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
+use super::subject::{OrbitViews, SetOptions, Subject, VIEW_PX};
 use crate::failures::stand::Stand;
 use crate::study::check_if_measured;
 
@@ -70,8 +70,11 @@ fn rays(light: Light) -> LightRays {
     }
 }
 
-fn sets() -> Vec<SetSize> {
-    IMAGES.into_iter().flat_map(|images| DENSITIES.map(|density| SetSize { images, density })).collect()
+fn sets() -> Vec<SetOptions> {
+    IMAGES
+        .into_iter()
+        .flat_map(|images| DENSITIES.map(|density| SetOptions { images, density, ..SetOptions::DEFAULT }))
+        .collect()
 }
 
 /// Adds tables, charts and checks of all subjects.
@@ -129,7 +132,7 @@ fn checks(front: &LightFront) -> Vec<Check> {
 }
 
 fn is_finite(row: &LightRow) -> bool {
-    [row.view_ms, row.sampling_s, row.flip, row.psnr_db, row.unknown.unwrap_or(0.0)]
+    [row.view_ms, row.sampled.seconds, row.flip, row.psnr_db, row.unknown.unwrap_or(0.0)]
         .iter()
         .all(|figure| figure.is_finite())
 }
@@ -151,7 +154,7 @@ mod tests {
     use report::Outcome;
 
     use super::*;
-    use crate::lit::measure::Drawing;
+    use crate::lit::measure::{Drawing, SamplingResult};
 
     /// Direct drawing halves its error in twice the time; shared light has one time and one error.
     fn front(shared_ms: f64, shared_flip: f64) -> LightFront {
@@ -159,7 +162,7 @@ mod tests {
             drawing,
             set,
             view_ms,
-            sampling_s: 1.0,
+            sampled: SamplingResult::default(),
             flip,
             psnr_db: 30.0,
             unknown: None,
@@ -172,7 +175,7 @@ mod tests {
         for set in sets() {
             rows.extend(QUALITIES.map(|q| row(Drawing::LightCache(q), Some(set), shared_ms, shared_flip)));
         }
-        rows.push(row(Drawing::JointCarve, Some(SetSize::DEFAULT), 20.0, 0.2));
+        rows.push(row(Drawing::JointCarve, Some(SetOptions::DEFAULT), 20.0, 0.2));
         let truth = Light::Indirect.truth(DIRECT_RAYS[6]);
         let lighting = "soft 16, indirect 64".parse().unwrap();
         LightFront { subject: "a room", lighting, light: Light::Indirect, is_interior: true, truth, rows }

@@ -12,7 +12,7 @@ use report::{Bar, Check};
 use super::light::{DIRECT_RAYS, Light, SAMPLES_A_PIXEL};
 use super::measure::{LightFront, LitRows};
 use super::report::add_to;
-use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
+use super::subject::{OrbitViews, SetOptions, Subject, VIEW_PX};
 use crate::failures::stand::Stand;
 use crate::statistics::geometric_mean;
 use crate::study::{RunArgs, check_if_measured, is_named};
@@ -93,7 +93,7 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     let rows = LitRows {
         direct: &DIRECT_RAYS[..if light == Light::Occlusion { OCCLUSION_RAYS } else { DIRECT_RAYS.len() }],
         qualities: &QUALITIES,
-        sets: vec![SetSize::DEFAULT],
+        sets: vec![SetOptions::DEFAULT],
         has_joint_carve: false,
         views: OrbitViews { count: args.views.into(), size_px: VIEW_PX },
         runs: if args.study.quick { 1 } else { RUNS },

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::time::Instant;
 
+use codec::encode_depth_image;
 use depth_image::{Antialias, DepthImage, LightCacheQuality, PinholeCamera, View, ViewPlanes};
 use gpu::Turn;
 use metrics::PictureErrors;
@@ -12,7 +13,7 @@ use report::Point;
 
 use super::direct::DirectCurve;
 use super::light::{Light, LightRays, SAMPLES_A_PIXEL};
-use super::subject::{OrbitViews, SetSize, Stage, Subject};
+use super::subject::{OrbitViews, SetOptions, Stage, Subject};
 use crate::evaluation::mean_errors;
 use crate::failures::cached_light::{LitScene, unknown_share};
 use crate::failures::measures::mean;
@@ -41,15 +42,26 @@ pub enum Drawing {
 pub struct LightRow {
     pub drawing: Drawing,
     /// `None` in direct drawing.
-    pub set: Option<SetSize>,
+    pub set: Option<SetOptions>,
     /// The median of the views.
     pub view_ms: f64,
-    /// Seconds of the whole set; 0 in direct drawing.
-    pub sampling_s: f64,
+    /// What sampling took and gave; nothing in direct drawing.
+    pub sampled: SamplingResult,
     pub flip: f64,
     pub psnr_db: f64,
     /// The share of surface pixels whose light no sample knows; `None` but with light from samples.
     pub unknown: Option<f64>,
+}
+
+/// A sample set.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SamplingResult {
+    /// Of the whole set.
+    pub seconds: f64,
+    /// Of the whole set, encoded.
+    pub bytes: usize,
+    /// Texels with a sample.
+    pub samples: usize,
 }
 
 /// The rows of a subject, and how they are measured.
@@ -59,7 +71,7 @@ pub struct LitRows {
     pub direct: &'static [LightRays],
     pub qualities: &'static [LightCacheQuality],
     /// Sets for each quality.
-    pub sets: Vec<SetSize>,
+    pub sets: Vec<SetOptions>,
     pub has_joint_carve: bool,
     pub views: OrbitViews,
     /// Each view is timed this often.
@@ -86,8 +98,8 @@ enum Drawer<'s> {
 /// A row before it is measured.
 struct OpenRow<'s> {
     drawing: Drawing,
-    set: Option<SetSize>,
-    sampling_s: f64,
+    set: Option<SetOptions>,
+    sampled: SamplingResult,
     drawer: Drawer<'s>,
 }
 
@@ -113,15 +125,20 @@ impl LitRows {
         let mut rows = Vec::new();
         for &rays in self.direct {
             let drawer = Drawer::Scene(stage.lit.in_light(&light.lighting(rays.a_pixel()))?);
-            rows.push(OpenRow { drawing: Drawing::Direct(rays), set: None, sampling_s: 0.0, drawer });
+            rows.push(OpenRow {
+                drawing: Drawing::Direct(rays),
+                set: None,
+                sampled: SamplingResult::default(),
+                drawer,
+            });
         }
         for &set in &self.sets {
-            let (images, sampling_s) = sampled(stage, set, |cameras| stage.lit.samples(cameras))?;
+            let (images, sampled) = sampled(stage, set, |cameras| stage.lit.samples_by(set.sampling, cameras))?;
             let cached = stage.lit.with_samples(&images, LightCacheQuality::Balanced)?;
             rows.extend(self.qualities.iter().map(|&quality| OpenRow {
                 drawing: Drawing::LightCache(quality),
                 set: Some(set),
-                sampling_s,
+                sampled,
                 drawer: Drawer::Scene(cached.at_quality(quality)),
             }));
         }
@@ -153,7 +170,7 @@ impl LightFront {
     /// The row of a quality with the default set.
     pub fn at_quality(&self, quality: LightCacheQuality) -> Option<&LightRow> {
         let mut rows = self.rows.iter();
-        rows.find(|row| row.drawing == Drawing::LightCache(quality) && row.set == Some(SetSize::DEFAULT))
+        rows.find(|row| row.drawing == Drawing::LightCache(quality) && row.set == Some(SetOptions::DEFAULT))
     }
 
     /// The time of direct drawing with a row's FLIP over the row's, at least.
@@ -203,25 +220,32 @@ fn antialias() -> Antialias {
 }
 
 fn joint_carve<'s>(stage: &Stage<'s>) -> anyhow::Result<OpenRow<'s>> {
-    let set = SetSize::DEFAULT;
-    let (images, sampling_s) = sampled(stage, set, |cameras| stage.lit.color_samples(cameras))?;
+    let set = SetOptions::DEFAULT;
+    let (images, sampled) = sampled(stage, set, |cameras| stage.lit.color_samples(cameras))?;
     let images = stage.stand.reconstructor().upload(&images, &description(&stage.scene, None), Turn::default())?;
     let drawer = Drawer::Images(stage.stand, Box::new(images));
-    Ok(OpenRow { drawing: Drawing::JointCarve, set: Some(set), sampling_s, drawer })
+    Ok(OpenRow { drawing: Drawing::JointCarve, set: Some(set), sampled, drawer })
 }
 
-/// Decoded images of a set, and the seconds of sampling it.
+/// Decoded images of a set, and what sampling it took.
 fn sampled(
     stage: &Stage<'_>,
-    set: SetSize,
+    set: SetOptions,
     sample: impl Fn(&[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>>,
-) -> anyhow::Result<(Vec<DepthImage>, f64)> {
-    sample(&stage.sample_cameras(SetSize { density: WARM_UP_DENSITY, ..set }))?;
+) -> anyhow::Result<(Vec<DepthImage>, SamplingResult)> {
+    sample(&stage.sample_cameras(SetOptions { density: WARM_UP_DENSITY, ..set }))?;
     let cameras = stage.sample_cameras(set);
     let start = Instant::now();
     let images = sample(&cameras)?;
-    let sampling_s = start.elapsed().as_secs_f64();
-    Ok((images.iter().map(encoded_and_decoded).collect::<anyhow::Result<_>>()?, sampling_s))
+    let seconds = start.elapsed().as_secs_f64();
+    let depths = images.iter().flat_map(|image| &image.inverse_depth_per_m);
+    let mut result = SamplingResult { seconds, bytes: 0, samples: depths.filter(|&&depth| depth > 0.0).count() };
+    let mut decoded = Vec::with_capacity(images.len());
+    for image in &images {
+        result.bytes += encode_depth_image(image)?.payload.len();
+        decoded.push(encoded_and_decoded(image)?);
+    }
+    Ok((decoded, result))
 }
 
 impl Drawer<'_> {
@@ -265,7 +289,7 @@ impl OpenRow<'_> {
             drawing: self.drawing,
             set: self.set,
             view_ms: median(views_s) * 1e3,
-            sampling_s: self.sampling_s,
+            sampled: self.sampled,
             flip,
             psnr_db,
             unknown,

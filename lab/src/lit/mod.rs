@@ -1,6 +1,6 @@
 //! Views under expensive light: shared light beside direct drawing at equal error.
 //!
-//! `study light_cache` and `study fronts` measure the same rows on the same kinds of subject.
+//! `study light_cache`, `study fronts` and `study sampling` measure the same rows on the same kinds of subject.
 
 mod direct;
 pub mod fronts;
@@ -8,4 +8,5 @@ pub mod light;
 pub mod light_cache;
 mod measure;
 mod report;
+pub mod sampling;
 mod subject;

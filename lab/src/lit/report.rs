@@ -16,13 +16,14 @@ struct ComparedRow<'f> {
     faster_from: Option<f64>,
 }
 
-fn columns<'f>() -> [Column<ComparedRow<'f>>; 11] {
+fn columns<'f>() -> [Column<ComparedRow<'f>>; 12] {
     [
         Column::new("representation", |row| row.row.drawing.to_string().into()),
+        Column::new("samples", |row| row.row.set.map(|set| set.sampling.to_string()).into()),
         Column::new("S", |row| row.row.set.map(|set| set.images).into()),
         Column::new("density", |row| row.row.set.map(|set| set.density).into()),
         Column::with_unit("a view", "ms", |row| row.row.view_ms.into()),
-        Column::with_unit("sampling", "s", |row| row.row.set.map(|_| row.row.sampling_s).into()),
+        Column::with_unit("sampling", "s", |row| row.row.set.map(|_| row.row.sampled.seconds).into()),
         Column::new("FLIP", |row| row.row.flip.into()),
         Column::with_unit("PSNR", "dB", |row| row.row.psnr_db.into()),
         Column::with_unit("unknown", "%", |row| row.row.unknown.map(|share| share * 100.0).into()),
@@ -48,7 +49,7 @@ impl<'f> ComparedRow<'f> {
     fn new(front: &LightFront, row: &'f LightRow) -> Self {
         let direct = front.direct();
         let saved_s = (direct.least_ms_at(row.flip) - row.view_ms) * 1e-3;
-        let faster_from = (saved_s > 0.0).then(|| (row.sampling_s / saved_s).floor() + 1.0);
+        let faster_from = (saved_s > 0.0).then(|| (row.sampled.seconds / saved_s).floor() + 1.0);
         Self {
             row,
             is_on_front: front.is_on_front(row),

@@ -8,6 +8,7 @@ use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, ViewCell};
 use glam::{UVec2, Vec3};
 use render::Lighting;
+use sampling::SamplingMethod;
 use scene::{Scene, SceneSpec};
 
 use crate::failures::cached_light::LitScene;
@@ -46,7 +47,8 @@ pub struct OrbitViews {
 
 /// The images of a sample set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SetSize {
+pub struct SetOptions {
+    pub sampling: SamplingMethod,
     /// S: one camera in the middle of the view cell, or four at its corners.
     pub images: usize,
     /// Focal length of the images over that of the views, both in pixels.
@@ -97,14 +99,14 @@ impl Subject {
     }
 }
 
-impl SetSize {
+impl SetOptions {
     /// Four images, whose texels have a view pixel's focal length.
-    pub const DEFAULT: Self = Self { images: 4, density: 1.0 };
+    pub const DEFAULT: Self = Self { sampling: SamplingMethod::CONVENTIONAL, images: 4, density: 1.0 };
 }
 
 impl Stage<'_> {
     /// The cameras of a sample set.
-    pub fn sample_cameras(&self, set: SetSize) -> Vec<PinholeCamera> {
+    pub fn sample_cameras(&self, set: SetOptions) -> Vec<PinholeCamera> {
         let cameras = match set.images {
             4 => self.corners.clone(),
             images => self.cell.nested_cameras(images, self.corners[0].size_px),

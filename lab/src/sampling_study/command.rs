@@ -1,5 +1,7 @@
 //! `myriorama-lab study sampling`.
 
+use std::path::PathBuf;
+
 use app_core::exit::Outcome;
 use clap::Args;
 
@@ -9,10 +11,13 @@ use super::sizes::{sizes, sizes_report};
 use super::subject::{SCENES, Subject};
 use super::tables::tables;
 use super::times::{times, times_report};
+use crate::failures::stand::Stand;
+use crate::lit::sampling as shared_light;
 use crate::study::RunArgs;
 
 /// Samples a bird's nest, grass, a city and a tree from three viewpoints by every method. Reports redundant,
-/// disoccluded and useful samples, their availability in output frames, and the costs of sampling.
+/// disoccluded and useful samples, their availability in output frames, and the costs of sampling. Then compares conventional
+/// images with those without covered pixels for shared light.
 #[derive(Debug, Args)]
 pub struct SamplingArgs {
     #[command(flatten)]
@@ -20,6 +25,9 @@ pub struct SamplingArgs {
     /// Only these scenes: bird-nest, grass, urban, tree
     #[arg(long = "scene", value_name = "NAME", value_parser = SCENES)]
     scenes: Vec<String>,
+    /// A folder that has FlightHelmet or whose subfolders have it, for shared light
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
 }
 
 /// Measures all scenes and writes the report.
@@ -46,5 +54,8 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     }
     tables(&rows, &mut report)?;
     times_report(&costs, extent, &mut report)?;
+    if args.scenes.is_empty() {
+        shared_light::measure(&Stand::new(&engine, false), args.study.quick, args.models.as_deref(), &mut report)?;
+    }
     args.study.finish("out/study/sampling", &report)
 }

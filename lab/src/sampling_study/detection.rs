@@ -15,9 +15,9 @@ const SIDE_PX: u32 = 64;
 const DISTANCE_M: f32 = 4.0;
 /// The distance of the two viewpoints.
 const BASELINE_M: f32 = 0.37;
-const TESTS: [Redundancy; 3] = [Redundancy::Pixel, Redundancy::Visibility, Redundancy::Tolerance];
+const TESTS: [Redundancy; 3] = [Redundancy::Pixel, Redundancy::Visibility, Redundancy::Coverage];
 
-/// The shares of redundant samples that the tests by pixel, visibility and tolerance find on a wall of triangles with
+/// The shares of redundant samples that the tests by pixel, visibility and coverage find on a wall of triangles with
 /// legs of this length.
 ///
 /// # Errors
@@ -35,10 +35,10 @@ pub fn found_redundant(engine: &Arc<GpuEngine>, leg_px: f32) -> anyhow::Result<[
         let images = sampler.sample(&SampleWork {
             draw,
             cameras: &cameras(),
+            tile_count: 1,
             wanted: &[0, 1],
             method,
             planes,
-            temporal_reference_s: None,
         })?;
         *found = left_out(&images[1]);
     }

@@ -5,11 +5,10 @@ use sampling::{Redundancy, SamplingMethod};
 /// The number of images of a set, as in the paper.
 pub const IMAGES: usize = 3;
 /// The methods that are compared, conventional sampling first.
-pub const METHODS: [SamplingMethod; 6] = [
+pub const METHODS: [SamplingMethod; 5] = [
     SamplingMethod::CONVENTIONAL,
     SamplingMethod::NonRedundant(Redundancy::Pixel),
     SamplingMethod::NonRedundant(Redundancy::Visibility),
-    SamplingMethod::NonRedundant(Redundancy::Tolerance),
+    SamplingMethod::NonRedundant(Redundancy::Coverage),
     SamplingMethod::DepthPeeling { layers: IMAGES as u32 },
-    SamplingMethod::Useful(Redundancy::Pixel),
 ];

@@ -101,14 +101,7 @@ impl Subject {
     ) -> anyhow::Result<Vec<DepthImage>> {
         let cameras = pinholes(&self.cameras(method, size_px));
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let work = SampleWork {
-            draw: self.work(),
-            cameras: &cameras,
-            wanted: &wanted,
-            method,
-            planes,
-            temporal_reference_s: None,
-        };
+        let work = SampleWork { draw: self.work(), cameras: &cameras, tile_count: 1, wanted: &wanted, method, planes };
         Ok(self.sampler.sample(&work)?)
     }
 

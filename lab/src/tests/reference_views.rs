@@ -75,12 +75,12 @@ fn unknown_names_are_refused_with_their_field() {
                 &SampleWork {
                     scene_hash: scene_hash.to_owned(),
                     cameras: samples.clone(),
+                    tile_count: 1,
                     wanted: vec![0, 1],
                     sampling: sampling.to_owned(),
                     planes: cluster::SamplePlanes::default(),
                     lighting: lighting.to_owned(),
                     scene_time_s: 0.0,
-                    temporal_reference_s: None,
                     refinement: cluster::Refinement::default(),
                     surfaces_by_rays: None,
                 },

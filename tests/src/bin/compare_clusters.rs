@@ -24,16 +24,8 @@ use wire::rpc::{NodeClient, SamplerClient, connect};
 const VIEWS: usize = 2;
 const VIEW_SIZE_PX: UVec2 = UVec2::new(120, 90);
 const LIGHTINGS: [&str; 2] = ["unlit", "soft 4, occlusion 4"];
-const SAMPLINGS: [&str; 8] = [
-    "conventional",
-    "non_redundant:pixel",
-    "non_redundant:visibility",
-    "non_redundant:tolerance",
-    "useful:pixel",
-    "useful:visibility",
-    "useful:tolerance",
-    "depth_peeling:3",
-];
+const SAMPLINGS: [&str; 5] =
+    ["conventional", "non_redundant:pixel", "non_redundant:visibility", "non_redundant:coverage", "depth_peeling:3"];
 const METHODS: [&str; 6] =
     ["joint_carve", "joint_carve:2", "light_field_search:50", "mesh", "hybrid_mesh", "hybrid_mesh:0.5"];
 

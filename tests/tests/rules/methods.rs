@@ -160,12 +160,12 @@ fn a_named_method_is_seen_by_its_variant_and_by_its_text() {
             "fn f() { matches!(m, reconstruction::ReconstructionMethod::HybridMesh { .. }) }",
             "ReconstructionMethod::HybridMesh",
         ),
-        ("use sampling::SamplingMethod::{self, Useful};", "SamplingMethod::Useful"),
+        ("use sampling::SamplingMethod::{self, NonRedundant};", "SamplingMethod::NonRedundant"),
         ("use SamplingMethod::*;", "SamplingMethod::*"),
         ("const M: &str = \"joint_carve:2\";", "joint_carve"),
         ("fn f() { println!(\"drawn by light_field_search\") }", "light_field_search"),
         ("const M: &str = \"mesh\";", "mesh"),
-        ("const M: &str = r#\"useful:pixel\"#;", "useful"),
+        ("const M: &str = r#\"non_redundant:pixel\"#;", "non_redundant"),
     ] {
         assert_eq!(named(source), [expected], "{source}");
     }
@@ -177,7 +177,7 @@ fn defaults_comments_tests_and_plain_words_name_no_method() {
         "fn f() -> M { ReconstructionMethod::default() }",
         "fn f() { SamplingMethod::help(); METHODS[0].method }",
         "/// As joint_carve does.\nfn f() {} // by depth_peeling",
-        "const TEXT: &str = \"a mesh of useful triangles\";",
+        "const TEXT: &str = \"a mesh of conventional triangles\";",
         "#[cfg(test)] mod tests { const M: &str = \"joint_carve\"; }",
     ] {
         assert_eq!(named(source), [""; 0], "{source}");

@@ -37,13 +37,13 @@ impl Stand {
     fn work(&self, cameras: &[SampleCamera], sampling: &str) -> SampleWork {
         SampleWork {
             scene_hash: HASH.to_owned(),
+            tile_count: 1,
             cameras: cameras.to_vec(),
             wanted: (0..cameras.len() as u32).collect(),
             sampling: sampling.to_owned(),
             planes: engine().sample_planes("layered").expect("a method"),
             lighting: LIGHTING.to_owned(),
             scene_time_s: 0.0,
-            temporal_reference_s: None,
             refinement: Refinement::default(),
             surfaces_by_rays: None,
         }

@@ -96,12 +96,12 @@ fn sample_work(camera: SampleCamera) -> SampleWork {
     SampleWork {
         scene_hash: HASH.to_owned(),
         cameras: vec![camera],
+        tile_count: 1,
         wanted: vec![0],
         sampling: "conventional".to_owned(),
         planes: SamplePlanes { light: true, ..SamplePlanes::default() },
         lighting: LIGHTING.to_owned(),
         scene_time_s: 0.0,
-        temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
         surfaces_by_rays: Some(true),
     }
@@ -201,6 +201,7 @@ fn a_layered_cube_is_no_cache_of_light_yet() {
     let grid = CubeGrid::around(&scene().bounds(), 16).expect("a grid");
     let work = SampleWork {
         cameras: grid.cameras().map(SampleCamera::from).to_vec(),
+        tile_count: 1,
         wanted: vec![0, 1, 2],
         sampling: "layered_cube:16".to_owned(),
         planes: engine().sample_planes(METHOD).expect("planes"),

@@ -46,12 +46,12 @@ impl Stand {
         let work = SampleWork {
             scene_hash: HASH.to_owned(),
             cameras: grid.cameras().map(SampleCamera::from).to_vec(),
+            tile_count: 1,
             wanted: vec![0, 1, 2],
             sampling: format!("layered_cube:{side}"),
             planes: SamplePlanes::default(),
             lighting: LIGHTING.to_owned(),
             scene_time_s: 0.0,
-            temporal_reference_s: None,
             refinement: Refinement::default(),
             surfaces_by_rays: None,
         };

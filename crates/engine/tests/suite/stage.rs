@@ -41,13 +41,13 @@ fn planned_set(
 ) -> SampleSet {
     let work = SampleWork {
         scene_hash: hash.to_owned(),
+        tile_count: 1,
         cameras: cameras.iter().copied().map(|camera| camera.into().into()).collect(),
         wanted: (0..cameras.len() as u32).collect(),
         sampling: "conventional".to_owned(),
         planes,
         lighting: lighting.to_owned(),
         scene_time_s: 0.0,
-        temporal_reference_s: None,
         refinement: Refinement::default(),
         surfaces_by_rays: None,
     };

@@ -94,11 +94,10 @@ impl Stage {
         let on_device = GpuScene::upload(&device().gpu, &scene).expect("a scene");
         let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let test =
-            RedundancyTest { shader: APART.0, consults: Evidence::SurfaceIds, from_one_place: false, usefulness: None };
+        let test = RedundancyTest { shader: APART.0, consults: Evidence::SurfaceIds, from_one_place: false };
         let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
         let work = plainly_lit(&on_device);
-        let images = device().renderer.draw_image_sequence(work, &cameras, &wanted, planes, test, None);
+        let images = device().renderer.draw_image_sequence(work, &cameras, &wanted, planes, test);
         Self { images: images.expect("depth images"), volume: scene.bounds(), scene }
     }
 

@@ -30,9 +30,9 @@ fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
     let offset = direction * hit.t;
     let pixel_center = (vec2f(pixel) + 0.5) * hit.t;
     return Candidate(
-        vec4f(pixel_center, hit.t, 1.0), camera.eye_in_world + offset, camera.near_m / hit.t, normal,
+        vec4f(pixel_center, hit.t, 1.0), camera.eye_in_world + offset, camera.near_m / hit.t,
         stretched_footprint(hit.t, camera.footprint, normal, offset),
-        textureLoad(flat_triangles, texel_at(hit.slot), 0).xy, pixel, false,
+        textureLoad(flat_triangles, texel_at(hit.slot), 0).xy, pixel,
     );
 }
 {% endif %}

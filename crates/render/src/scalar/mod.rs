@@ -11,8 +11,5 @@ pub mod reflections;
 pub mod sequence;
 
 pub use crate::smooth_light::smoothed;
-pub use crate::{
-    known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS},
-    rays::primary::MOST_LAYERS,
-};
+pub use crate::{coverage::MOST_COARSER, known_samples::LEAST_FACING, rays::primary::MOST_LAYERS};
 pub use nearest::{Nearest, inverse_depth_per_m, nearest};

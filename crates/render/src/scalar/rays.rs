@@ -183,6 +183,13 @@ impl Scene {
         normal.normalize_or_zero() * if hit.front { 1.0 } else { -1.0 }
     }
 
+    /// The triangle's own, towards the side that was met; unit length.
+    #[must_use]
+    pub fn triangle_normal_in_world(&self, hit: &Hit) -> Vec3 {
+        let [a, b, c] = self.corners_of(hit.slot);
+        (b - a).cross(c - a).normalize_or_zero() * if hit.front { 1.0 } else { -1.0 }
+    }
+
     /// The look of a triangle whose material has no textures.
     #[must_use]
     pub fn look(&self, hit: &Hit) -> Look {

@@ -12,12 +12,8 @@ pub const SAME_LAYER: f32 = 1e-6;
 const MAX_LAYERS: u32 = 16;
 pub(super) const DEFAULT_LAYERS: u32 = 4;
 
-pub(super) const TEST: RedundancyTest = RedundancyTest {
-    shader: "depth_peeling.wgsl",
-    consults: Evidence::Samples,
-    from_one_place: true,
-    usefulness: None,
-};
+pub(super) const TEST: RedundancyTest =
+    RedundancyTest { shader: "depth_peeling.wgsl", consults: Evidence::Samples, from_one_place: true };
 
 pub(super) fn parse_layers(text: &str) -> Option<u32> {
     text.parse().ok().filter(|layers| (1..=MAX_LAYERS).contains(layers))

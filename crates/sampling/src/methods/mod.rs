@@ -6,20 +6,16 @@
 pub(crate) mod depth_peeling;
 pub(crate) mod layered_cube;
 pub(crate) mod non_redundant;
-pub(crate) mod useful;
 
 use depth_image::{
     Aabb, Antialias, Camera, CameraError, CubeGrid, LightFieldCamera, NamedMethod, PinholeCamera, Setting,
     named_methods,
 };
 use gpu::{ShaderError, Templates, wgsl_constants, wgsl_files};
-use render::{LayerSelection, RedundancyTest};
+use render::{LayerSelection, Lighting, RedundancyTest};
 
 use self::depth_peeling::SAME_LAYER;
-use self::non_redundant::{
-    CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, SAME_DEPTH, SAME_FACING, SAME_FOOTPRINTS, SLOPE_PX,
-};
-use self::useful::{BLOCKER_FOOTPRINTS, RING};
+use self::non_redundant::{SAME_DEPTH, SAME_FOOTPRINTS};
 use crate::error::SamplingError;
 pub use layered_cube::{LayeredCube, LightFieldSize};
 pub use non_redundant::Redundancy;
@@ -30,10 +26,8 @@ pub enum SamplingMethod {
     /// Every visible surface, whether another image holds it too or not (Lages §4.1). The setting is the number of positions
     /// around a texel's centre whose colours count, too.
     Conventional(Antialias),
-    /// Only samples that no image before holds; behind others rays go on (Xie §3).
+    /// Only samples that no image before holds (Xie §3).
     NonRedundant(Redundancy),
-    /// The same, less the samples that no viewpoint between the sample cameras can see past their blockers.
-    Useful(Redundancy),
     /// Layer behind layer from one place: the middle of the sample cameras.
     DepthPeeling {
         /// Images, each of the surfaces behind the one before.
@@ -43,10 +37,10 @@ pub enum SamplingMethod {
     LayeredCube(LayeredCube),
 }
 
-use SamplingMethod::{Conventional, DepthPeeling, LayeredCube as Cube, NonRedundant, Useful};
+use SamplingMethod::{Conventional, DepthPeeling, LayeredCube as Cube, NonRedundant};
 
 /// All methods by name; the first is the default.
-pub const METHODS: [NamedMethod<SamplingMethod>; 5] = [
+pub const METHODS: [NamedMethod<SamplingMethod>; 4] = [
     NamedMethod {
         name: "conventional",
         method: SamplingMethod::CONVENTIONAL,
@@ -64,12 +58,6 @@ pub const METHODS: [NamedMethod<SamplingMethod>; 5] = [
             parse: |text| non_redundant::parse(text).map(NonRedundant),
         }),
         help: "takes the samples that no image before holds, by a test; by pixel unless said otherwise",
-    },
-    NamedMethod {
-        name: "useful",
-        method: Useful(Redundancy::Pixel),
-        setting: Some(Setting { form: non_redundant::FORM, parse: |text| non_redundant::parse(text).map(Useful) }),
-        help: "takes the same, less the samples that no view between the cameras can see",
     },
     NamedMethod {
         name: "depth_peeling",
@@ -95,14 +83,9 @@ pub const METHODS: [NamedMethod<SamplingMethod>; 5] = [
 /// When a text is not a template.
 pub fn templates() -> Result<Templates, ShaderError> {
     let own = wgsl_files! {
-        "non_redundant/pixel.wgsl", "non_redundant/visibility.wgsl", "non_redundant/tolerance.wgsl", "useful.wgsl",
-        "depth_peeling.wgsl"
+        "non_redundant/pixel.wgsl", "non_redundant/visibility.wgsl", "depth_peeling.wgsl"
     };
-    let constants = wgsl_constants! {
-        BLOCKER_FOOTPRINTS, CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, RING, SAME_DEPTH, SAME_FACING,
-        SAME_FOOTPRINTS, SAME_LAYER, SLOPE_PX
-    };
-    Ok(render::templates(&own)?.declaring(constants))
+    Ok(render::templates(&own)?.declaring(wgsl_constants! { SAME_DEPTH, SAME_FOOTPRINTS, SAME_LAYER }))
 }
 
 named_methods!(SamplingMethod, UnknownSampling, "sampling method");
@@ -111,23 +94,31 @@ impl SamplingMethod {
     /// Every visible surface, with the colour of a texel's centre.
     pub const CONVENTIONAL: Self = Conventional(Antialias::NONE);
 
+    /// The method under indirect light where none is named: its samples take longest, and are smoothed, so that pixels which several
+    /// images know need to be lit in one of them alone.
+    pub const OF_INDIRECT_LIGHT: Self = NonRedundant(Redundancy::Coverage);
+
+    /// The method where none is named.
+    #[must_use]
+    pub fn suited_to(lighting: Lighting) -> Self {
+        if lighting.is_indirect() { Self::OF_INDIRECT_LIGHT } else { Self::default() }
+    }
+
     /// All methods, each with all of its redundancy tests.
     pub fn all() -> impl Iterator<Item = Self> {
         METHODS.into_iter().flat_map(|row| match row.method {
             NonRedundant(_) => Redundancy::ALL.map(NonRedundant).to_vec(),
-            Useful(_) => Redundancy::ALL.map(Useful).to_vec(),
             method @ (Conventional(_) | DepthPeeling { .. } | Cube(_)) => vec![method],
         })
     }
 
     /// The names of the methods among which budgets choose, each with the least number of images of a set. With fewer the
-    /// first method has the same samples. Samples that depend on the planned views serve no others, and are not among them, nor are
-    /// cubes, which have no sample cameras near the views.
+    /// first method has the same samples. Cubes, which have no sample cameras near the views, are not among them.
     pub fn ladder() -> impl Iterator<Item = (&'static str, u32)> {
         METHODS.into_iter().filter_map(|row| match row.method {
             Conventional(_) => Some((row.name, 1)),
             NonRedundant(_) | DepthPeeling { .. } => Some((row.name, 2)),
-            Useful(_) | Cube(_) => None,
+            Cube(_) => None,
         })
     }
 
@@ -178,7 +169,7 @@ impl SamplingMethod {
         match self {
             DepthPeeling { .. } => depth_peeling::check(cameras),
             Cube(_) => Err(SamplingError::Lines { method: self.to_string() }),
-            Conventional(_) | NonRedundant(_) | Useful(_) => Ok(()),
+            Conventional(_) | NonRedundant(_) => Ok(()),
         }
     }
 
@@ -193,23 +184,28 @@ impl SamplingMethod {
     pub fn may_hold_light(self) -> bool {
         match self {
             Conventional(antialias) => antialias == Antialias::NONE,
-            NonRedundant(_) | Useful(_) => true,
+            NonRedundant(_) => true,
             DepthPeeling { .. } | Cube(_) => false,
         }
     }
 
-    /// The test by which an image omits samples that others hold.
+    /// The test by which an image omits samples that others hold, and shows what lies behind.
     #[must_use]
     pub fn redundancy_test(self) -> Option<RedundancyTest> {
         match self {
             Conventional(_) | Cube(_) => None,
-            NonRedundant(redundancy) => Some(redundancy.test()),
-            Useful(redundancy) => Some(useful::test(redundancy)),
+            NonRedundant(redundancy) => redundancy.test(),
             DepthPeeling { .. } => Some(depth_peeling::TEST),
         }
     }
 
-    /// Whether each image can be taken without the others.
+    /// Whether an image omits pixels that the surfaces of images before cover.
+    #[must_use]
+    pub fn omits_covered_pixels(self) -> bool {
+        self == NonRedundant(Redundancy::Coverage)
+    }
+
+    /// Whether each image, and each tile of one, can be taken without the others.
     #[must_use]
     pub fn images_are_independent(self) -> bool {
         self.redundancy_test().is_none()
@@ -221,17 +217,11 @@ impl SamplingMethod {
         self.redundancy_test().is_some_and(|test| !test.traces_rays())
     }
 
-    /// Whether samples of a moving scene are held against a temporal reference.
-    #[must_use]
-    pub fn has_hysteresis(self) -> bool {
-        matches!(self, NonRedundant(Redundancy::Tolerance) | Useful(Redundancy::Tolerance))
-    }
-
     /// The setting as users spell it.
     fn setting(self) -> Option<String> {
         match self {
             Conventional(antialias) => (antialias > Antialias::NONE).then(|| antialias.to_string()),
-            NonRedundant(redundancy) | Useful(redundancy) => Some(redundancy.to_string()),
+            NonRedundant(redundancy) => Some(redundancy.to_string()),
             DepthPeeling { layers } => Some(layers.to_string()),
             Cube(cube) => Some(cube.to_string()),
         }
@@ -247,7 +237,7 @@ mod tests {
         for method in SamplingMethod::all() {
             assert_eq!(method.to_string().parse(), Ok(method));
         }
-        assert_eq!(SamplingMethod::all().count(), 9);
+        assert_eq!(SamplingMethod::all().count(), 6);
         assert_eq!("non-redundant".parse(), Ok(NonRedundant(Redundancy::Pixel)));
         let filtered = Conventional(Antialias::of(4).expect("offered"));
         assert_eq!(("conventional:4".parse(), filtered.to_string().as_str()), (Ok(filtered), "conventional:4"));
@@ -280,8 +270,7 @@ mod tests {
     #[test]
     fn the_error_names_every_method_and_test() {
         let error = "peeling".parse::<SamplingMethod>().expect_err("no method").to_string();
-        for name in ["conventional", "non_redundant:TEST", "visibility", "tolerance", "useful", "depth_peeling:LAYERS"]
-        {
+        for name in ["conventional", "non_redundant:TEST", "visibility", "coverage", "depth_peeling:LAYERS"] {
             assert!(error.contains(name), "{name} is not in {error}");
         }
     }

@@ -4,7 +4,7 @@ use depth_image::{PinholeCamera, Ray, SurfaceId};
 use glam::{UVec2, Vec2, Vec3};
 use render::scalar::{
     LEAST_FACING,
-    rays::{Hit, Scene, pixel_ray},
+    rays::{Hit, Scene},
 };
 
 /// A sample that an image would show.
@@ -14,6 +14,8 @@ pub struct Candidate {
     pub point_in_world: Vec3,
     /// Unit length, towards the camera.
     pub normal: Vec3,
+    /// The triangle's own, towards the camera.
+    pub triangle_normal: Vec3,
     /// The triangle.
     pub id: SurfaceId,
     /// A pixel's length on the surface.
@@ -29,6 +31,7 @@ impl Candidate {
         Self {
             point_in_world: ray.origin_in_world + sight,
             normal,
+            triangle_normal: scene.triangle_normal_in_world(hit),
             id: scene.surface_id(hit),
             footprint_m: stretched_footprint(hit.t, camera, normal, sight),
             planar_depth_m: hit.t,
@@ -40,12 +43,6 @@ impl Candidate {
 fn stretched_footprint(planar_depth_m: f32, camera: &PinholeCamera, normal: Vec3, sight: Vec3) -> f32 {
     let facing = normal.dot(sight).abs() / sight.length().max(1e-15);
     planar_depth_m / camera.focal_px.min_element() / facing.max(LEAST_FACING)
-}
-
-/// A held sample's length on its surface.
-pub(super) fn footprint_m(camera: &PinholeCamera, texel: UVec2, inverse_depth_per_m: f32, normal: Vec3) -> f32 {
-    let sight = pixel_ray(camera, texel).direction_in_world;
-    stretched_footprint(inverse_depth_per_m.recip(), camera, normal, sight)
 }
 
 /// The pixel and planar depth at which a camera sees a point, if it does.

@@ -30,7 +30,7 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
     let draw = DrawWork { lighting, visibility: Visibility::Triangles, ..unlit(&yard().on_device) };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let method = SamplingMethod::CONVENTIONAL;
-    device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, temporal_reference_s: None })
+    device().sampler.sample(&SampleWork { draw, cameras, tile_count: 1, wanted: &wanted, method, planes })
 }
 
 /// More than one submission holds, of two sizes.

@@ -37,8 +37,7 @@ fn a_set_in_slices_is_the_whole_set_with_every_method() {
                 turn: Default::default(),
             };
             let planes = SamplePlanes { normal: true, specular: true, corners: true, ..SamplePlanes::default() };
-            let work =
-                SampleWork { draw, cameras: &cameras, wanted: &wanted, method, planes, temporal_reference_s: None };
+            let work = SampleWork { draw, cameras: &cameras, tile_count: 1, wanted: &wanted, method, planes };
             let whole = sampler.sample(&work).expect("images");
             let before = gpu.device_queue.slices();
             let live = gpu.device_queue.force_slices(1);

@@ -1,12 +1,11 @@
-//! Redundant samples: triangles of a texel's size, floors at a grazing angle, tolerance and jitter. Layers from one place.
+//! Redundant samples: triangles of a texel's size, floors at a grazing angle, and jitter. Layers from one place.
 
 use depth_image::{DepthImage, PinholeCamera};
 use fixtures::{poles, quad};
 use glam::{Affine3A, Vec3};
 use render::GpuScene;
-use sampling::{Redundancy, SamplingMethod, scalar};
+use sampling::{Redundancy, SamplingMethod};
 use scene::Instance;
-use scene::procedural::courtyard;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{samples, share};
@@ -17,11 +16,11 @@ use crate::sampling_study::found_redundant;
 const TESTS: [SamplingMethod; 3] = [
     SamplingMethod::NonRedundant(Redundancy::Pixel),
     SamplingMethod::NonRedundant(Redundancy::Visibility),
-    SamplingMethod::NonRedundant(Redundancy::Tolerance),
+    SamplingMethod::NonRedundant(Redundancy::Coverage),
 ];
 const ALL: &[Shape] = &[Shape::Bounded { least: 0.95, most: 1.0 }];
 
-pub const CURVES: [Curve; 5] = [
+pub const CURVES: [Curve; 4] = [
     Curve {
         name: "Redundant samples found against triangles",
         subject: "a tessellated wall that two images see whole",
@@ -31,7 +30,7 @@ pub const CURVES: [Curve; 5] = [
         series: &[
             Series::new("pixel", &[Shape::rises(0.5, 0.03)]),
             Series::new("visibility", ALL),
-            Series::new("tolerance", ALL),
+            Series::new("coverage", ALL),
         ],
         why: "Another image seldom meets a triangle that is smaller than a texel at its texel: its samples are kept twice.",
         measure: by_leg,
@@ -44,20 +43,10 @@ pub const CURVES: [Curve; 5] = [
         series: &[
             Series::new("pixel", &[Shape::falls(0.2, 0.02), Shape::EqualAt { x: 85.0, y: 0.9, tolerance: 0.1 }]),
             Series::new("visibility", ALL),
-            Series::new("tolerance", &[Shape::falls(0.9, 0.02), Shape::EqualAt { x: 80.0, y: 0.0, tolerance: 0.05 }]),
+            Series::new("coverage", &[Shape::falls(0.8, 0.02), Shape::EqualAt { x: 80.0, y: 0.0, tolerance: 0.05 }]),
         ],
-        why: "Two large triangles are the same triangles however few texels of the first image they fill; only the tolerance compares footprints.",
+        why: "Two large triangles are the same triangles however few texels of the first image they fill; only the coverage compares footprints.",
         measure: by_angle,
-    },
-    Curve {
-        name: "Surfaces lost against the tolerance",
-        subject: "a courtyard, two images, the twin",
-        x: X::log("allowed difference, over the default", "", &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
-            .with_small(&[0.125, 0.5, 1.0, 2.0, 8.0]),
-        y: ["share of a view's surfaces that no image holds", ""],
-        series: &[Series::new("tolerance", &[Shape::rises(0.002, 2e-3)])],
-        why: "From the default on, walls that the other image met at a slant count as fine enough, and samples are omitted that no image holds.",
-        measure: by_tolerance,
     },
     Curve {
         name: "Flicker against jitter",
@@ -67,7 +56,7 @@ pub const CURVES: [Curve; 5] = [
         series: &[
             Series::new("pixel", &[Shape::rises(0.01, 0.01), STILL, Shape::Bounded { least: 0.0, most: 0.1 }]),
             Series::new("visibility", &[STILL, Shape::Bounded { least: 0.0, most: 0.05 }]),
-            Series::new("tolerance", &[STILL, Shape::Bounded { least: 0.0, most: 0.1 }]),
+            Series::new("coverage", &[STILL, Shape::Bounded { least: 0.0, most: 0.1 }]),
         ],
         why: "Tests by texel flip where a texel's triangle changes; what stands still does not flicker.",
         measure: by_jitter,
@@ -106,24 +95,6 @@ fn by_angle(stand: &Stand, angles_deg: &[f64]) -> anyhow::Result<Rows> {
             *omitted = 1.0 - kept as f64 / whole as f64;
         }
         Ok(omitted)
-    })
-}
-
-fn by_tolerance(stand: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
-    let scene = courtyard();
-    let rays = render::scalar::rays::Scene::of(&stand.upload(&scene)?, 0.0)?;
-    let center = scene.bounds().center();
-    let reach = scene.bounds().size().length();
-    let [middle, left, right] = [0.05, -0.15, 0.2].map(|x| {
-        let eye = center + Vec3::new(x, 0.5, 0.9) * reach;
-        PinholeCamera::looking_at(eye, center, Vec3::Y, 0.7, stand.view_px)
-    });
-    let view = scalar::sample(&rays, &[middle], SamplingMethod::CONVENTIONAL).remove(0);
-    rows(factors, |factor| {
-        let settings = scalar::Settings { allowed: factor as f32, ..scalar::Settings::default() };
-        let images = scalar::sample_with(&rays, &[left, right], TESTS[2], settings);
-        let lost = metrics::unheld_rate(&middle, &view.inverse_depth_per_m, &images)?;
-        Ok([lost.unwrap_or(f64::NAN)])
     })
 }
 

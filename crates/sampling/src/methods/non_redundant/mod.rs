@@ -11,43 +11,33 @@ pub enum Redundancy {
     Pixel,
     /// The sample is seen from that image's viewpoint (Xie, Algorithm 2).
     Visibility,
-    /// The image has a sample nearby of the same surface, facing the same way and not much coarser.
-    Tolerance,
+    /// The image has samples all around the sample, of the same surface and not much coarser: what views look up there, they find in
+    /// that image. Nothing is shown in its place.
+    Coverage,
 }
 
-pub(super) const FORM: &str = "TEST (pixel, visibility or tolerance)";
+pub(super) const FORM: &str = "TEST (pixel, visibility or coverage)";
 
 /// Visibility: the share of its depth that a point may be off by.
 pub const SAME_DEPTH: f32 = 2e-5;
 /// Visibility: the share of the pixel's length on the surface that a point may be off by, besides.
 pub const SAME_FOOTPRINTS: f32 = 0.0625;
-/// Tolerance: depths are the same within this many footprints.
-pub const DEPTH_FOOTPRINTS: f32 = 2.0;
-/// Tolerance: the pixels for which a surface may go on changing its depth at its own slope.
-pub const SLOPE_PX: f32 = 1.0;
-/// Tolerance: the cosine of 25 degrees.
-pub const SAME_FACING: f32 = 0.906_307_8;
-/// Tolerance: the greatest ratio of footprints.
-pub const COARSER: f32 = 1.5;
-/// Tolerance: the share of these limits that samples of the temporal reference are held to.
-pub const CLEARLY: f32 = 0.8;
-/// Tolerance: the cosine of 20 degrees, for samples of the temporal reference.
-pub const CLEARLY_SAME_FACING: f32 = 0.939_692_6;
 
 pub(super) fn parse(text: &str) -> Option<Redundancy> {
     Redundancy::ALL.into_iter().find(|redundancy| redundancy.to_string() == text)
 }
 
 impl Redundancy {
-    pub(super) const ALL: [Self; 3] = [Self::Pixel, Self::Visibility, Self::Tolerance];
+    pub(super) const ALL: [Self; 3] = [Self::Pixel, Self::Visibility, Self::Coverage];
 
-    pub(super) const fn test(self) -> RedundancyTest {
+    /// The test of candidates on the way of a ray; `None` where images omit pixels of what they see first.
+    pub(super) const fn test(self) -> Option<RedundancyTest> {
         let (shader, consults) = match self {
             Self::Pixel => ("non_redundant/pixel.wgsl", Evidence::SurfaceIds),
             Self::Visibility => ("non_redundant/visibility.wgsl", Evidence::Scene),
-            Self::Tolerance => ("non_redundant/tolerance.wgsl", Evidence::Samples),
+            Self::Coverage => return None,
         };
-        RedundancyTest { shader, consults, from_one_place: false, usefulness: None }
+        Some(RedundancyTest { shader, consults, from_one_place: false })
     }
 }
 
@@ -56,7 +46,7 @@ impl fmt::Display for Redundancy {
         f.write_str(match self {
             Self::Pixel => "pixel",
             Self::Visibility => "visibility",
-            Self::Tolerance => "tolerance",
+            Self::Coverage => "coverage",
         })
     }
 }
