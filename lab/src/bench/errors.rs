@@ -66,7 +66,7 @@ pub fn compare(name: &str, reference: &ReferenceViews, args: &BenchArgs, report:
 
 /// Evaluates a scene with disocclusions.
 pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
-    compare_scene(GAPS, GAPS.parse()?, args, engine, report)
+    compare_scene(GAPS, fixtures::spec(GAPS)?, args, engine, report)
 }
 
 /// Evaluates the models of the folder, if one is given.

@@ -157,7 +157,8 @@ mod tests {
     fn subjects_can_be_loaded_and_four_are_quick() {
         assert_eq!(SUBJECTS.iter().filter(|subject| subject.is_quick).count(), 4);
         for subject in &SUBJECTS {
-            subject.scene.parse::<scene::SceneSpec>().unwrap();
+            let spec = fixtures::spec(subject.scene).unwrap();
+            assert!(!matches!(spec, scene::SceneSpec::File(_)), "{spec} is no file");
             subject.lighting.parse::<render::Lighting>().unwrap();
         }
     }
