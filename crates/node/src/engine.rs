@@ -146,9 +146,7 @@ impl SampleWork {
             surfaces_by_rays: pixel_count.and_then(|pixels| workload.finds_surfaces_by_rays(pixels)),
         }
     }
-}
 
-impl SampleWork {
     /// The camera of a tile; `None` beyond the last.
     #[must_use]
     pub fn camera_of_tile(&self, tile: u32) -> Option<SampleCamera> {

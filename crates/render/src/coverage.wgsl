@@ -6,6 +6,7 @@
 {% include "surfaces.wgsl" %}
 {% include "lamp_shares.wgsl" %}
 {% include "cached_texels.wgsl" %}
+{% include "footprint.wgsl" %}
 {% include "pixel_list.wgsl" %}
 
 // 1 for pixels that keep their samples.
@@ -33,16 +34,11 @@ fn is_surrounded(image: CacheCamera, point: Point) -> bool {
     return is_on_surface;
 }
 
-// A texel's length on a surface, seen along `sight`.
-fn stretched(footprint_m: f32, normal: vec3f, sight: vec3f) -> f32 {
-    return footprint_m / max(abs(dot(normal, normalize(sight))), LEAST_FACING);
-}
-
 // Whether an image before knows the light of the point and of all around it: at the corners of a square that reaches a pixel to each
 // side on the triangle's plane. There it is not much coarser.
 fn is_covered(point: Point) -> bool {
     let normal = point.triangle_normal;
-    let own_m = stretched(point.footprint_m, normal, point.offset);
+    let own_m = stretched_footprint(1.0, point.footprint_m, normal, point.offset);
     // Head-on, any two directions do.
     let across = cross(normal, normalize(point.offset) + camera.column_in_world * (1e-3 / camera.footprint));
     let aside = across * (point.footprint_m * inverseSqrt(max(dot(across, across), 1e-30)));
@@ -51,7 +47,8 @@ fn is_covered(point: Point) -> bool {
     for (var number = 0u; number < cache.camera_count && !covered; number++) {
         let image = cache.cameras[number];
         let depth_m = dot(image.homogeneous_texel_from_offset[2], vec4f(point.offset, 1.0));
-        covered = stretched(depth_m * image.footprint, normal, point.offset - image.eye_offset) <= MOST_COARSER * own_m;
+        let held_m = stretched_footprint(depth_m, image.footprint, normal, point.offset - image.eye_offset);
+        covered = held_m <= MOST_COARSER * own_m;
         for (var corner = 0u; corner < 4u && covered; corner++) {
             var around = point;
             around.offset += select(-aside, aside, (corner & 1u) == 1u) + select(-along, along, corner >= 2u);

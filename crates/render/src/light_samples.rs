@@ -14,6 +14,11 @@ pub(crate) const MAX_CACHE_CAMERAS: u32 = 16;
 /// Values of stored inverse depth; a step between two of them is the range over one fewer.
 pub(crate) const DEPTH_CODES: f32 = 65_534.0;
 
+/// The distance of a point from the plane of a texel's triangle up to which both are on one surface (`fast`, `balanced`, coverage).
+pub const PLANE_FOOTPRINTS: f32 = 0.25;
+/// The angle between their normals up to which they are.
+pub const TURNED_DEG: f32 = 23.0;
+
 /// Samples of light on a device.
 pub struct LightCache {
     pub(crate) samples: Table,
@@ -96,8 +101,8 @@ impl LookUpTests {
     pub fn surrounded() -> Self {
         Self {
             least_coverage: 0.75,
-            plane_footprints: 0.25,
-            least_cosine: 23_f32.to_radians().cos(),
+            plane_footprints: PLANE_FOOTPRINTS,
+            least_cosine: TURNED_DEG.to_radians().cos(),
             most_difference: f32::MAX,
         }
     }

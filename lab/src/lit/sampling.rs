@@ -24,7 +24,7 @@ const SAMPLINGS: [SamplingMethod; 2] =
 const SCENES: [&str; 6] = ["tree-terrain-500k", "urban", "courtyard", "bird-nest", "FlightHelmet", "gallery"];
 const QUICK_SCENES: [&str; 2] = ["tree-terrain-125k", "courtyard"];
 const IMAGES: [usize; 2] = [2, 4];
-const DENSITIES: [f32; 3] = [0.5, 0.71, 1.0];
+const DENSITIES: [f32; 2] = [0.71, 1.0];
 /// The most that the default of a light takes over the other.
 const MOST_DEFAULT_RATIO: f64 = 1.15;
 /// Bytes of the set without covered pixels over those of the conventional one.
@@ -86,18 +86,15 @@ impl SetRow {
 /// # Errors
 /// A scene cannot be used, or the device fails.
 pub fn measure(stand: &Stand, is_quick: bool, models: Option<&Path>, report: &mut Report) -> anyhow::Result<()> {
-    let densities = if is_quick { &DENSITIES[1..] } else { &DENSITIES[..] };
     let sets = SAMPLINGS.into_iter().flat_map(|sampling| {
-        IMAGES
-            .into_iter()
-            .flat_map(move |images| densities.iter().map(move |&density| SetOptions { sampling, images, density }))
+        IMAGES.into_iter().flat_map(move |images| DENSITIES.map(|density| SetOptions { sampling, images, density }))
     });
     let rows = LitRows {
         direct: &DIRECT_RAYS[..5],
         qualities: &[Draft, Balanced],
         sets: sets.collect(),
         has_joint_carve: false,
-        views: OrbitViews { count: if is_quick { 1 } else { 2 }, size_px: VIEW_PX },
+        views: OrbitViews { count: 1, size_px: VIEW_PX },
         runs: 3,
     };
     let mut all = Vec::new();

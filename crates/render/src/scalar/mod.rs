@@ -10,6 +10,7 @@ pub mod rays;
 pub mod reflections;
 pub mod sequence;
 
+pub use crate::light_samples::{PLANE_FOOTPRINTS, TURNED_DEG};
 pub use crate::smooth_light::smoothed;
 pub use crate::{coverage::MOST_COARSER, known_samples::LEAST_FACING, rays::primary::MOST_LAYERS};
 pub use nearest::{Nearest, inverse_depth_per_m, nearest};

@@ -260,6 +260,18 @@ mod tests {
     }
 
     #[test]
+    fn indirect_light_is_sampled_by_coverage_and_other_light_by_the_first_method() {
+        for (lighting, method) in [
+            ("soft 16, indirect 64", "non_redundant:coverage"),
+            ("soft 16, occlusion 16", "conventional"),
+            ("phong", "conventional"),
+        ] {
+            let lighting = lighting.parse().expect("a lighting");
+            assert_eq!(SamplingMethod::suited_to(lighting).to_string(), method);
+        }
+    }
+
+    #[test]
     fn the_table_lists_every_method_by_its_own_name() {
         for row in &METHODS {
             assert_eq!(row.name.parse(), Ok(row.method), "{}", row.name);

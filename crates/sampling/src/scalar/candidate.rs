@@ -40,7 +40,8 @@ impl Candidate {
     }
 }
 
-fn stretched_footprint(planar_depth_m: f32, camera: &PinholeCamera, normal: Vec3, sight: Vec3) -> f32 {
+/// A pixel's length on a surface at this depth that is met along `sight`.
+pub(super) fn stretched_footprint(planar_depth_m: f32, camera: &PinholeCamera, normal: Vec3, sight: Vec3) -> f32 {
     let facing = normal.dot(sight).abs() / sight.length().max(1e-15);
     planar_depth_m / camera.focal_px.min_element() / facing.max(LEAST_FACING)
 }

@@ -3,13 +3,9 @@
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
 use render::scalar::rays::{Scene, pixel_ray};
-use render::scalar::{LEAST_FACING, MOST_COARSER};
+use render::scalar::{MOST_COARSER, PLANE_FOOTPRINTS, TURNED_DEG};
 
-use super::candidate::{Candidate, index_of, place};
-
-/// As in look-ups of light: the distance from the plane of a triangle, in footprints, and the cosine between normals.
-const PLANE_FOOTPRINTS: f32 = 0.25;
-const LEAST_COSINE: f32 = 0.920_504_9;
+use super::candidate::{Candidate, index_of, place, stretched_footprint};
 
 /// The first surfaces that a camera sees.
 pub(super) struct Surfaces {
@@ -36,14 +32,14 @@ impl Surfaces {
         let normal = candidate.triangle_normal;
         let sight = point - own.eye_in_world;
         let own_m = candidate.planar_depth_m / own.focal_px.min_element();
-        let own_stretched_m = stretched(own_m, normal, sight);
+        let own_stretched_m = stretched_footprint(candidate.planar_depth_m, own, normal, sight);
         let column = own.world_from_camera * Vec3::X / own.focal_px.x * own.focal_px.min_element();
         let across = normal.cross(sight.normalize_or_zero() + column * 1e-3);
         let aside = across * (own_m / across.length().max(1e-15));
         let along = normal.cross(aside) * (own_stretched_m / own_m);
         let from_here = point - self.camera.eye_in_world;
-        let here_m = from_here.dot(self.camera.forward_in_world()) / self.camera.focal_px.min_element();
-        stretched(here_m, normal, from_here) <= MOST_COARSER * own_stretched_m
+        let depth_m = from_here.dot(self.camera.forward_in_world());
+        stretched_footprint(depth_m, &self.camera, normal, from_here) <= MOST_COARSER * own_stretched_m
             && [-aside - along, aside - along, along - aside, aside + along]
                 .into_iter()
                 .all(|way| self.surround(point + way, normal, own_m))
@@ -61,15 +57,10 @@ impl Surfaces {
         [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE].into_iter().all(|corner| {
             self.points[index_of(camera, low.as_uvec2() + corner)].is_some_and(|(held, held_normal)| {
                 let gap = point - held;
-                normal.dot(held_normal) >= LEAST_COSINE
+                normal.dot(held_normal) >= TURNED_DEG.to_radians().cos()
                     && gap.dot(normal).abs() <= plane_m
                     && gap.dot(held_normal).abs() <= plane_m
             })
         })
     }
-}
-
-/// A texel's length on a surface, seen along `sight`.
-fn stretched(footprint_m: f32, normal: Vec3, sight: Vec3) -> f32 {
-    footprint_m / normal.dot(sight.normalize_or_zero()).abs().max(LEAST_FACING)
 }

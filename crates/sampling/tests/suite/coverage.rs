@@ -134,8 +134,8 @@ fn cameras_on_one_spot_alone_behind_a_wall_and_sixteen_of_them_are_sampled() {
     let images = sample(draw, &[front, behind, front], COVERAGE);
     assert_eq!(holes(&images[1]), 0, "the other side is another surface");
     assert!(holes(&images[2]) > 3900);
-    let seventeen = pinholes(&[front; 18]);
-    assert!(tiles(draw, &seventeen, 1, &[17], COVERAGE).is_err(), "more images before than a device consults");
+    let eighteen = pinholes(&[front; 18]);
+    assert!(tiles(draw, &eighteen, 1, &[17], COVERAGE).is_err(), "more images before than a device consults");
 }
 
 /// In wind each moment has samples of its own; they follow from it alone.
