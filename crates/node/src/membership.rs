@@ -164,7 +164,7 @@ mod tests {
     use std::num::NonZeroU32;
 
     use super::*;
-    use crate::measure::tests::{Sleeper, request};
+    use crate::measure::tests::{SimulatedDevice, request};
 
     fn plan(policy: Policy) -> Assignment {
         Assignment {
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn a_warm_up_makes_one_picture_of_each_kind_in_the_plan() {
         for (policy, sampled, drawn) in [(Policy::Direct, 0, 1), (Policy::Pipeline, 1, 0), (Policy::TimeShare, 1, 0)] {
-            let engine = Sleeper::default();
+            let engine = SimulatedDevice::default();
             warm(&engine, &plan(policy), "joint_carve".to_owned()).unwrap();
             let calls = engine.calls.into_inner().unwrap();
             assert_eq!(
