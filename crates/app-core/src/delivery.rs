@@ -50,7 +50,7 @@ pub fn request(
     let takes_light = takes_light_from_samples(&method);
     Ok(SessionRequest {
         scene: None,
-        sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
+        sampling: sampling.unwrap_or_else(|| default_sampling(&lighting).to_string()),
         // Where surfaces come from the scene, so does what mirrors show.
         follows_mirrors: !takes_light && lighting.parse().is_ok_and(|lighting: Lighting| lighting.reflections() > 0),
         takes_light,
@@ -87,6 +87,11 @@ pub(crate) fn default_method(lighting: &str, Terms { policy, budget }: &Terms) -
         PolicyChoice::Pipeline | PolicyChoice::TimeShare => ReconstructionMethod::default().to_string(),
         PolicyChoice::Auto | PolicyChoice::Direct => DIRECT.to_owned(),
     }
+}
+
+/// How samples are taken where nobody names a method.
+fn default_sampling(lighting: &str) -> SamplingMethod {
+    lighting.parse().map_or_else(|_| SamplingMethod::default(), SamplingMethod::suited_to)
 }
 
 fn takes_light_from_samples(method: &str) -> bool {
@@ -235,6 +240,19 @@ mod tests {
             assert_eq!(method(lighting, &PolicyChoice::TimeShare.into()), "joint_carve");
             assert_eq!(method(lighting, &Terms { budget: budget.clone(), ..Terms::default() }), "joint_carve");
         }
+    }
+
+    #[test]
+    fn samples_are_taken_as_suits_the_sessions_light_unless_the_offer_names_how() {
+        let view = PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, glam::UVec2::ONE);
+        let sampling = |lighting: &str, named: Option<&str>| {
+            let sampling = named.map(str::to_owned);
+            let offered = OfferSettings { lighting: Some(lighting.to_owned()), sampling, method: None };
+            request(offered, PolicyChoice::Auto, &[view]).expect("a request").sampling
+        };
+        assert_eq!(sampling("soft 16, indirect 64", None), "non_redundant:coverage");
+        assert_eq!(sampling("soft 16, occlusion 16", None), "conventional");
+        assert_eq!(sampling("soft 16, indirect 64", Some("conventional")), "conventional");
     }
 
     #[test]

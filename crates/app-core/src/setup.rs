@@ -86,7 +86,7 @@ pub struct SceneArgs {
     pub method: Option<ReconstructionMethod>,
     /// The sampling method; `None` where the user names none
     #[arg(long, value_name = "NAME",
-        help = format!("Which samples are taken. {} [default: {}; {} where --lighting has indirect light]", SamplingMethod::help(),
+        help = format!("Which samples are taken. {} [default: {}; {} under indirect light]", SamplingMethod::help(),
             SamplingMethod::default(), SamplingMethod::OF_INDIRECT_LIGHT))]
     pub sampling: Option<SamplingMethod>,
     /// Size of the sample images, or auto: as in --samples, or from a quarter to twice the pixels of 400x300, so that they
@@ -228,7 +228,7 @@ impl SceneArgs {
             source_space: scene.source_space,
             settings: OfferSettings {
                 method: Some(self.method().to_string()),
-                sampling: Some(self.sampling().to_string()),
+                sampling: self.sampling.map(|sampling| sampling.to_string()),
                 lighting: Some(self.lighting.to_string()),
             },
             period_s: scene.period_s().map(f64::from),
