@@ -84,8 +84,9 @@ impl Run {
         (self.set_complete_s(counted_sets) - self.set_complete_s(0)) / counted_sets as f64
     }
 
+    /// The time at which this set and all before it are complete: sets that different nodes sample may end in another order.
     fn set_complete_s(&self, set: usize) -> f64 {
-        self.complete_s.get(set).copied().unwrap_or(f64::NAN)
+        self.complete_s.get(..=set).map_or(f64::NAN, |sets| sets.iter().copied().fold(0.0, f64::max))
     }
 
     /// T once the first sets have filled the cluster. The last ones do not count: while they are made nothing is sampled

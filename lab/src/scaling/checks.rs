@@ -10,6 +10,8 @@ use crate::study::check_if_measured;
 
 /// The share of their processor time that nodes must use, at the most nodes and views.
 const USED: f64 = 0.9;
+/// The efficiency that shared light must reach at every number of nodes.
+const LIT_EFFICIENCY: f64 = 0.88;
 /// The longest time of the quick form, seconds.
 const QUICK_S: f64 = 600.0;
 const NOT_MEASURED: &str = "it was not measured at eleven nodes and 1000 views";
@@ -20,6 +22,17 @@ pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
     let [pipeline, auto] = policies.map(|policy| results.find(policy, PAPER_NODES, PAPER_VIEWS));
     let efficiencies = [pipeline, auto].map(|point| point.map(|point| results.efficiency(point)));
     let paper = table_1(PAPER_NODES).map_or(f64::NAN, |row| row.proposed);
+    let lit = results.node_counts().into_iter().filter(|_| extent.is_lit).map(|nodes| {
+        let auto = results.find(PolicyChoice::Auto, nodes, PAPER_VIEWS);
+        let name = format!("efficiency of auto at P = {nodes}, V = 1000, shared light");
+        check_if_measured(
+            name,
+            auto.map(|point| results.efficiency(point)),
+            "",
+            Bar::AtLeast(LIT_EFFICIENCY),
+            NOT_MEASURED,
+        )
+    });
     let efficient = policies.into_iter().zip(efficiencies).map(|(policy, efficiency)| {
         let name = format!("efficiency of {policy} at P = 11, V = 1000 (the paper's: {paper})");
         check_if_measured(name, efficiency, "", Bar::AtLeast(paper), NOT_MEASURED)
@@ -48,5 +61,5 @@ pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
         ),
         check_if_measured("time of the quick form", seconds, "s", Bar::AtMost(QUICK_S), "this was the full form"),
     ];
-    efficient.chain(others).collect()
+    efficient.chain(lit).chain(others).collect()
 }

@@ -4,6 +4,7 @@ use std::fs::create_dir_all;
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
+use app_core::experiment::VIEW_SIZE_PX;
 use app_core::process::runtime;
 use app_core::setup::SceneArgs;
 use app_core::sizes::within;
@@ -19,10 +20,10 @@ use super::subject::Subject;
 use crate::study::RunArgs;
 
 /// Measures the time between two sample sets on a coordinator and P node processes, for P = 2…11 nodes, V = 10…1000
-/// views and every policy. Each node has an equal share of this machine's processors by control groups of Linux, so
-/// that eleven nodes fit two cores. The paper's figures and the predictions stand beside the results. A simulation
+/// views and every policy. The nodes share this machine's processors in equal parts by control groups of Linux, so that
+/// eleven nodes fit two cores. The paper's figures and the predictions stand beside the results. A simulation
 /// around the same schedule is compared with them and goes on to 1,000 nodes. With --quick a subset is measured in under
-/// ten minutes: P = 11 and 5.
+/// ten minutes: P = 11 and 5, with shared light at V = 1000 alone, in views of 80×60.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  myriorama-lab bench scaling --quick\n  myriorama-lab bench scaling --out out/scaling"
@@ -57,10 +58,11 @@ pub struct ScalingArgs {
 const FOLDER: &str = "out/bench-scaling";
 
 impl ScalingArgs {
-    fn request(&self) -> Request {
+    fn request(&self, is_lit: bool) -> Request {
+        let [nodes, views] = [usize::from(self.nodes), self.views as usize];
         Request {
             device: self.run.device.device,
-            extent: Extent { quick: self.run.quick, nodes: usize::from(self.nodes), views: self.views as usize },
+            extent: Extent { quick: self.run.quick, nodes, views, is_lit },
             quota_cores: self.quota,
             event_log: self.run.folder(FOLDER).join("schedule.log"),
         }
@@ -72,11 +74,14 @@ impl ScalingArgs {
 /// # Errors
 /// Input that cannot be used, no control groups, or a failure of the cluster.
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
-    let request = args.request();
     let folder = args.run.folder(FOLDER);
     create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     let scene = SceneArgs { method: Some(args.method), lighting: args.lighting, ..SceneArgs::new(args.scene.clone()) };
-    let subject = Subject::load(&scene)?;
+    let is_lit = args.method.light_cache_quality().is_some();
+    // A view of shared light takes ten times as long as one of images alone.
+    let view_size_px = if is_lit && args.run.quick { VIEW_SIZE_PX * 2 / 5 } else { VIEW_SIZE_PX };
+    let subject = Subject::load(&scene, view_size_px)?;
+    let request = args.request(is_lit);
     let results = runtime()?.block_on(take(&request, &subject))?;
     println!("simulating up to {} nodes", args.simulate_to);
     let report = report(&results, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;

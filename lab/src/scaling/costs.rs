@@ -10,9 +10,10 @@ use super::subject::{MEASURED_BATCH, Subject};
 #[derive(Debug, Clone, Default)]
 pub struct Timed {
     pub nodes: usize,
+    pub quota_cores: f64,
     /// Costs of every node, once for each request.
     pub costs: Vec<Costs>,
-    /// Costs with one view a call.
+    /// Costs with one view a call; without them calls are taken to cost nothing.
     pub alone: Vec<Costs>,
 }
 
@@ -25,7 +26,7 @@ impl Timed {
     /// Costs of a view, and of a call to the device: both follow from calls of one view and of many.
     pub fn by_view_and_call(&self) -> (Costs, Calls) {
         let costs = self.mean();
-        let alone = mean(&self.alone);
+        let alone = if self.alone.is_empty() { costs } else { mean(&self.alone) };
         let [reconstruct_view_s, reconstruct_s] = view_and_call_s(alone.reconstruct_view_s, costs.reconstruct_view_s);
         let [direct_view_s, direct_s] = view_and_call_s(alone.direct_view_s, costs.direct_view_s);
         (Costs { reconstruct_view_s, direct_view_s, ..costs }, Calls { reconstruct_s, direct_s })
@@ -62,9 +63,11 @@ pub fn mean(all: &[Costs]) -> Costs {
 pub async fn measure(nodes: &Nodes, subject: &Subject, batch: u32) -> anyhow::Result<Vec<Costs>> {
     let count = nodes.count();
     let views = subject.views(count * MEASURED_BATCH as usize)?;
-    let requests =
-        (0..count).map(|node| subject.measurement(views.iter().skip(node).step_by(count).copied().collect(), batch));
-    nodes.measure(requests).await
+    let requests = (0..count).map(|node| {
+        let own_views = views.iter().skip(node).step_by(count).copied().collect();
+        subject.measurement(subject.set(), own_views, batch)
+    });
+    nodes.measure(requests.collect::<anyhow::Result<Vec<_>>>()?).await
 }
 
 /// (S·g_s + V·(c+e)) / (P·T): the work of one node over the time of P nodes.
@@ -101,7 +104,7 @@ mod tests {
         let many = f64::from(MEASURED_BATCH);
         let of_many = Costs { reconstruct_view_s: 0.01 / many + 0.002, direct_view_s: 0.005, ..Costs::default() };
         let alone = Costs { reconstruct_view_s: 0.012, direct_view_s: 0.005, ..Costs::default() };
-        let timed = Timed { nodes: 1, costs: vec![of_many], alone: vec![alone] };
+        let timed = Timed { nodes: 1, quota_cores: 1.0, costs: vec![of_many], alone: vec![alone] };
         let (costs, calls) = timed.by_view_and_call();
         assert!((costs.reconstruct_view_s - 0.002).abs() < 1e-12 && (calls.reconstruct_s - 0.01).abs() < 1e-12);
         assert!((costs.direct_view_s - 0.005).abs() < 1e-12 && calls.direct_s.abs() < 1e-12);

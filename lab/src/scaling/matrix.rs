@@ -27,9 +27,16 @@ pub struct Extent {
     pub quick: bool,
     pub nodes: usize,
     pub views: usize,
+    /// Samples hold light.
+    pub is_lit: bool,
 }
 
 impl Extent {
+    /// Whether costs are timed once, before the points of a number of nodes, and not after them or one view at a time.
+    pub fn times_once(self) -> bool {
+        self.quick && self.is_lit
+    }
+
     /// Seconds that sets are counted for, where one set takes less.
     fn counted_s(self) -> f64 {
         if self.quick { 12.0 } else { 20.0 }
@@ -50,6 +57,7 @@ impl Extent {
 
     fn quick_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
         match nodes {
+            _ if self.is_lit => vec![(Auto, PAPER_VIEWS)],
             _ if nodes == self.nodes => [10, 100, PAPER_VIEWS]
                 .into_iter()
                 .flat_map(|views| [(Pipeline, views), (Auto, views), (Direct, views)])
@@ -127,7 +135,7 @@ mod tests {
 
     #[test]
     fn the_quick_form_has_table_1s_ends_and_takes_minutes() {
-        let quick = all(Extent { quick: true, nodes: 11, views: 1000 });
+        let quick = all(Extent { quick: true, nodes: 11, views: 1000, is_lit: false });
         let has = |policy, nodes, views| {
             quick.iter().any(|p| p.settings.policy == policy && p.nodes == nodes && p.settings.views == views)
         };
@@ -138,14 +146,14 @@ mod tests {
 
     #[test]
     fn the_full_form_has_all_of_table_1() {
-        let full = all(Extent { quick: false, nodes: 11, views: 1000 });
+        let full = all(Extent { quick: false, nodes: 11, views: 1000, is_lit: false });
         for nodes in 2..=11 {
             let views = |policy| {
                 full.iter().any(|p| p.nodes == nodes && p.settings.policy == policy && p.settings.views == 1000)
             };
             assert!([Pipeline, TimeShare, Auto, Direct].into_iter().all(views), "{nodes}");
         }
-        let counts = Extent { quick: false, nodes: 6, views: 1000 }.node_counts();
+        let counts = Extent { quick: false, nodes: 6, views: 1000, is_lit: false }.node_counts();
         assert_eq!(counts, [6, 5, 4, 3, 2], "fewer nodes than the paper's");
     }
 }

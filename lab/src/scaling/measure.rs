@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use app_core::process::StopSignals;
 use app_core::progress::bar;
-use cluster::Costs;
+use cluster::{Costs, MeasureCosts};
+use glam::UVec2;
 use gpu::DevicePreference;
 use indicatif::ProgressBar;
 
@@ -16,10 +17,17 @@ use super::nodes::Nodes;
 use super::point::{Point, PointSettings};
 use super::prediction::Traffic;
 use super::results::Results;
-use super::subject::{MEASURED_BATCH, Subject};
+use super::subject::{MEASURED_BATCH, SetSize, Subject};
 
 /// Attempts at a point whose plan changes while it is measured; the last one counts.
 const ATTEMPTS: u32 = 2;
+
+/// The size of pictures for which only shaders are built.
+const SMALL_PX: UVec2 = UVec2::new(16, 12);
+
+/// Sizes of sets whose costs tell which is cheapest.
+const SET_IMAGES: [usize; 3] = [1, 2, 4];
+const SET_DENSITIES: [f32; 3] = [0.25, 0.5, 1.0];
 
 /// Cores for the client, the coordinator and the kernel's part in their traffic.
 const CLIENT_CORES: f64 = 0.35;
@@ -32,6 +40,12 @@ pub struct Request {
     /// Cores of a node; by default as many as fit this machine.
     pub quota_cores: Option<f64>,
     pub event_log: PathBuf,
+}
+
+impl Request {
+    fn quota(&self, nodes: usize) -> f64 {
+        self.quota_cores.unwrap_or_else(|| default_quota(nodes))
+    }
 }
 
 /// Cores of each of `nodes` nodes, which share all cores but the client's.
@@ -56,23 +70,22 @@ pub async fn take(request: &Request, subject: &Subject) -> anyhow::Result<Result
 async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Result<Results> {
     let start = Instant::now();
     let count = request.extent.nodes;
-    let quota_cores = request.quota_cores.unwrap_or_else(|| default_quota(count));
     let mut nodes = Nodes::start(&subject.args, request.device, count, &request.event_log).await?;
     let device = nodes.device().to_owned();
-    println!("{count} nodes of {quota_cores:.3} cores each on {device}");
-    let unlimited = warm(&nodes, subject).await?;
+    println!("{count} nodes on {device}");
+    let unlimited = warm(&nodes, subject, request.extent.times_once()).await?;
     println!("all are ready after {:.0} s", start.elapsed().as_secs_f64());
-    nodes.limit(quota_cores)?;
+    let sets = sets(&nodes, subject).await?;
     nodes.rest().await?;
     let mut timed = Vec::new();
-    let points = points(&mut nodes, subject, request.extent, &mut timed).await?;
+    let points = points(&mut nodes, subject, request, &mut timed).await?;
     let results = Results {
         device,
         lighting: subject.args.lighting,
         cores: std::thread::available_parallelism().map_or(1, usize::from) as f64,
-        quota_cores,
-        images: subject.images(),
+        set: subject.set(),
         unlimited,
+        sets,
         timed,
         points: Vec::new(),
         traffic: Traffic::default(),
@@ -82,21 +95,62 @@ async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Resul
 }
 
 /// Lets every node do all kinds of work once, alone and without a limit. Shaders are then built, the scene is loaded,
-/// and rays and triangles are timed undisturbed.
-async fn warm(nodes: &Nodes, subject: &Subject) -> anyhow::Result<Vec<Costs>> {
+/// and rays and triangles are timed undisturbed. With `times_once` one node tells the costs, and the others do small work.
+async fn warm(nodes: &Nodes, subject: &Subject, times_once: bool) -> anyhow::Result<Vec<Costs>> {
     let progress = bar("nodes load the scene and build shaders", nodes.count());
-    let request = subject.measurement(subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH);
-    let unlimited = nodes.measure_in_turn(&request, || progress.inc(1)).await;
+    let request = subject.measurement(subject.set(), subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH)?;
+    let small = small_request(&request);
+    let mut unlimited = Vec::new();
+    for node in 0..nodes.count() {
+        if times_once && node > 0 {
+            nodes.measure_on(node, small.clone()).await?;
+        } else {
+            unlimited.push(nodes.measure_on(node, request.clone()).await?);
+        }
+        progress.inc(1);
+    }
     progress.finish_and_clear();
-    unlimited
+    Ok(unlimited)
+}
+
+/// The same work with images and views of few pixels.
+fn small_request(request: &MeasureCosts) -> MeasureCosts {
+    let mut small = request.clone();
+    for camera in &mut small.workload.sample_cameras {
+        *camera = camera.resized(SMALL_PX);
+    }
+    for view in &mut small.typical_views {
+        *view = view.resized(SMALL_PX);
+    }
+    small
+}
+
+/// Lets one node do all kinds of work without a limit, with each size of a set of light.
+async fn sets(nodes: &Nodes, subject: &Subject) -> anyhow::Result<Vec<(SetSize, Costs)>> {
+    if !subject.takes_light() {
+        return Ok(Vec::new());
+    }
+    let sizes = SET_IMAGES.into_iter().flat_map(|images| SET_DENSITIES.map(|density| SetSize { images, density }));
+    let progress = bar("one node samples sets of other sizes", SET_IMAGES.len() * SET_DENSITIES.len());
+    let mut sets = Vec::new();
+    for set in sizes {
+        let request = subject.measurement(set, subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH)?;
+        sets.push((set, nodes.measure_on(0, request).await?));
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    println!("one node has timed {} sizes of sets", sets.len());
+    Ok(sets)
 }
 
 /// Times the costs at this number of nodes.
-async fn time(nodes: &Nodes, subject: &Subject, timed: &mut Vec<Timed>) -> anyhow::Result<()> {
+async fn time(nodes: &Nodes, subject: &Subject, timed: &mut Vec<Timed>, once: bool) -> anyhow::Result<()> {
     let start = Instant::now();
     if timed.last().is_none_or(|timed| timed.nodes != nodes.count()) {
-        let alone = costs::measure(nodes, subject, 1).await?;
-        timed.push(Timed { nodes: nodes.count(), alone, ..Timed::default() });
+        let alone = if once { Vec::new() } else { costs::measure(nodes, subject, 1).await? };
+        timed.push(Timed { nodes: nodes.count(), quota_cores: nodes.quota_cores, alone, ..Timed::default() });
+    } else if once {
+        return Ok(());
     }
     let costs = costs::measure(nodes, subject, MEASURED_BATCH).await?;
     timed.iter_mut().last().into_iter().for_each(|timed| timed.costs.extend(&costs));
@@ -107,10 +161,13 @@ async fn time(nodes: &Nodes, subject: &Subject, timed: &mut Vec<Timed>) -> anyho
 async fn points(
     nodes: &mut Nodes,
     subject: &Subject,
-    extent: Extent,
+    request: &Request,
     timed: &mut Vec<Timed>,
 ) -> anyhow::Result<Vec<Point>> {
-    time(nodes, subject, timed).await?;
+    let extent = request.extent;
+    let once = extent.times_once();
+    nodes.limit(request.quota(nodes.count()))?;
+    time(nodes, subject, timed, once).await?;
     let costs = timed.first().map_or_else(Costs::default, Timed::mean);
     let all = all_points(extent, &costs, subject.images());
     let about_s: f64 = all.iter().map(|point| point.about_s).sum();
@@ -120,9 +177,10 @@ async fn points(
     let mut done_s = 0.0;
     for Planned { settings, nodes: count, about_s } in all {
         if count < nodes.count() {
-            time(nodes, subject, timed).await?;
+            time(nodes, subject, timed, once).await?;
             nodes.shrink_to(count).await?;
-            time(nodes, subject, timed).await?;
+            nodes.limit(request.quota(count))?;
+            time(nodes, subject, timed, once).await?;
         }
         progress.set_message(format!("P = {count}, V = {}, {}", settings.views, settings.policy));
         let point = point(nodes, subject, settings, done_s, about_s, &progress).await?;
@@ -133,7 +191,7 @@ async fn points(
         nodes.rest().await?;
     }
     progress.finish_and_clear();
-    time(nodes, subject, timed).await?;
+    time(nodes, subject, timed, once).await?;
     Ok(points)
 }
 

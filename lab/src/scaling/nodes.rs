@@ -82,15 +82,10 @@ impl Nodes {
         Ok(all)
     }
 
-    /// Lets nodes time their work one after the other.
-    pub async fn measure_in_turn(&self, request: &MeasureCosts, mut done: impl FnMut()) -> anyhow::Result<Vec<Costs>> {
-        let mut all = Vec::new();
-        for node in &self.processes.nodes {
-            let client = NodeClient::new(connect(&node.address).await?);
-            all.push(client.measure_costs(request.clone()).await?.costs);
-            done();
-        }
-        Ok(all)
+    /// Lets one node time its work.
+    pub async fn measure_on(&self, node: usize, request: MeasureCosts) -> anyhow::Result<Costs> {
+        let client = NodeClient::new(connect(&self.processes.nodes[node].address).await?);
+        Ok(client.measure_costs(request).await?.costs)
     }
 
     /// Ends the last nodes, so that `nodes` are left, and waits until the coordinator misses them.

@@ -9,7 +9,7 @@ use report::Report;
 use super::checks::checks;
 use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS};
 use super::results::Results;
-use super::tables::{costs_table, headline_table, paper_table, points_table};
+use super::tables::{costs_table, headline_table, paper_table, points_table, set_costs_table};
 use super::{charts, sweep};
 use crate::markdown::markdown;
 use crate::study::{new_report, table};
@@ -19,9 +19,8 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
     let mut report = new_report("Myriorama bench: scaling", &results.device);
     report.parameter("scene", scene);
     report.parameter("lighting", results.lighting.to_string());
-    report.parameter("sample images S", results.images);
+    report.parameter("sample images S", results.set.images);
     report.parameter("cores", results.cores);
-    report.parameter("quota of a node (cores)", results.quota_cores);
     report.parameter("quick", extent.quick);
     report.parameter("nodes P at most", extent.nodes);
     report.parameter("bytes of a sample image", results.traffic.image_bytes);
@@ -36,10 +35,14 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
     ]);
     report.charts.extend(charts::charts(results));
     let scenarios = sweep::scenarios(results);
-    let simulated = sweep::sweep(results, &scenarios, most_simulated);
+    let simulated = sweep::sweep(results, &scenarios, &sweep::VIEWS, most_simulated);
     report.tables.push(sweep::reach_table(&scenarios, &simulated)?);
     report.tables.push(table(sweep::SWEEP_TABLE, &sweep::COLUMNS, &simulated)?);
     report.charts.push(sweep::chart(&scenarios, &simulated));
+    if !results.sets.is_empty() {
+        let by_set = sweep::sweep(results, &sweep::set_scenarios(results), &sweep::SET_VIEWS, most_simulated);
+        report.tables.extend([set_costs_table(results)?, sweep::cheapest_sets(results, &by_set)?]);
+    }
     report.summary = summary(results);
     report.checks = checks(results, extent);
     Ok(report)

@@ -7,6 +7,7 @@ use super::costs::{Timed, efficiency};
 use super::matrix::PAPER_VIEWS;
 use super::point::Point;
 use super::prediction::{Prediction, Traffic, predict};
+use super::subject::SetSize;
 
 /// A measured point with its predictions.
 #[derive(Debug, Clone)]
@@ -21,11 +22,12 @@ pub struct Results {
     pub device: String,
     pub lighting: Lighting,
     pub cores: f64,
-    pub quota_cores: f64,
-    /// The number of sample images, S.
-    pub images: usize,
+    /// The set of all points.
+    pub set: SetSize,
     /// Costs of single nodes without a limit, on all cores, while the others rest.
     pub unlimited: Vec<Costs>,
+    /// Costs of a node without a limit by size of the set, where samples hold light.
+    pub sets: Vec<(SetSize, Costs)>,
     /// Costs, by falling P.
     pub timed: Vec<Timed>,
     /// Points, in the order of measurement.
@@ -40,7 +42,7 @@ impl Results {
         let traffic = Traffic::of(&points);
         let predicted = points.into_iter().map(|point| {
             let timed = self.timed.iter().find(|timed| timed.nodes == point.nodes);
-            let prediction = predict(timed.unwrap_or(&Timed::default()), traffic, self.images, &point);
+            let prediction = predict(timed.unwrap_or(&Timed::default()), traffic, self.set.images, &point);
             PredictedPoint { point, prediction }
         });
         Self { points: predicted.collect(), traffic, ..self }
@@ -53,7 +55,7 @@ impl Results {
 
     /// The efficiency (S·g_s + V·(c+e)) / (P·T) of a measured point.
     pub fn efficiency(&self, point: &Point) -> f64 {
-        efficiency(&self.mean(point.nodes), self.images, point.settings.views, point.nodes, point.period_s)
+        efficiency(&self.mean(point.nodes), self.set.images, point.settings.views, point.nodes, point.period_s)
     }
 
     fn measured(&self) -> impl Iterator<Item = &Point> {
@@ -80,6 +82,6 @@ impl Results {
             self.measured().filter(|point| point.settings.policy == PolicyChoice::Direct && point.nodes == nodes);
         let point = direct.max_by_key(|point| point.settings.views)?;
         let period_s = point.period_s * PAPER_VIEWS as f64 / point.settings.views as f64;
-        Some((efficiency(&self.mean(nodes), self.images, PAPER_VIEWS, nodes, period_s), point))
+        Some((efficiency(&self.mean(nodes), self.set.images, PAPER_VIEWS, nodes, period_s), point))
     }
 }

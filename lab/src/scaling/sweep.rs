@@ -6,13 +6,17 @@ use report::{Axis, Series, Table, XyChart};
 use simulation::{Cluster, Demand, Habits, Limit, Machine, plan, run, spread_speeds};
 
 use super::costs::{efficiency, mean};
+use super::prediction::Traffic;
 use super::results::Results;
+use super::subject::SetSize;
 use crate::study::Column;
 
 /// Numbers of nodes, P.
 const NODES: [usize; 9] = [2, 5, 11, 20, 50, 100, 200, 500, 1000];
 /// Numbers of views, V.
-const VIEWS: [usize; 3] = [1_000, 10_000, 100_000];
+pub const VIEWS: [usize; 3] = [1_000, 10_000, 100_000];
+/// Numbers of views at which sizes of sets are compared.
+pub const SET_VIEWS: [usize; 2] = [24, 1_000];
 /// The number of views V of the chart.
 const CHARTED_VIEWS: usize = 100_000;
 /// The least efficiency that counts as scaling.
@@ -34,6 +38,9 @@ const FAST: f64 = 30.0;
 pub struct Scenario {
     name: String,
     costs: Costs,
+    /// The number of sample images, S, and the bytes of one.
+    images: usize,
+    image_bytes: f64,
     /// The speed of every link.
     gbit_per_s: f64,
     /// True where the speeds of nodes differ.
@@ -64,21 +71,45 @@ pub fn scenarios(results: &Results) -> Vec<Scenario> {
         let costs = Machine::of(costs).faster(speed).costs;
         all.extend(GBITS.map(|gbit_per_s| Scenario {
             name: format!("{device}, {gbit_per_s:.0} Gbit/s"),
-            costs,
             gbit_per_s,
-            is_unequal: false,
+            ..Scenario::new(results, costs)
         }));
     }
     let name = "this machine, unequal nodes, 10 Gbit/s".to_owned();
-    all.push(Scenario { name, costs, gbit_per_s: 10.0, is_unequal: true });
+    all.push(Scenario { name, is_unequal: true, ..Scenario::new(results, costs) });
     all
 }
 
+/// Sets of every size on equal nodes.
+pub fn set_scenarios(results: &Results) -> Vec<Scenario> {
+    let of_set = |&(set, costs): &(SetSize, Costs)| Scenario {
+        name: scenario_name(set),
+        images: set.images,
+        image_bytes: results.traffic.image_bytes * f64::from(set.density / results.set.density).powi(2),
+        ..Scenario::new(results, costs)
+    };
+    results.sets.iter().map(of_set).collect()
+}
+
+impl Scenario {
+    /// Equal nodes on a network of 10 Gbit/s.
+    fn new(results: &Results, costs: Costs) -> Self {
+        Self {
+            name: String::new(),
+            costs,
+            images: results.set.images,
+            image_bytes: results.traffic.image_bytes,
+            gbit_per_s: 10.0,
+            is_unequal: false,
+        }
+    }
+}
+
 /// Simulates all scenarios at all P and V, many at the same time.
-pub fn sweep(results: &Results, scenarios: &[Scenario], most_nodes: usize) -> Vec<Simulated> {
+pub fn sweep(results: &Results, scenarios: &[Scenario], views: &[usize], most_nodes: usize) -> Vec<Simulated> {
     let points = scenarios.iter().flat_map(|scenario| {
         let nodes = NODES.into_iter().filter(move |&nodes| nodes <= most_nodes);
-        nodes.flat_map(move |nodes| VIEWS.map(|views| (scenario, nodes, views)))
+        nodes.flat_map(move |nodes| views.iter().map(move |&views| (scenario, nodes, views)))
     });
     let points: Vec<_> = points.collect();
     points.into_par_iter().filter_map(|(scenario, nodes, views)| simulated(results, scenario, nodes, views)).collect()
@@ -87,13 +118,16 @@ pub fn sweep(results: &Results, scenarios: &[Scenario], most_nodes: usize) -> Ve
 fn simulated(results: &Results, scenario: &Scenario, nodes: usize, views: usize) -> Option<Simulated> {
     let bytes_per_s = scenario.gbit_per_s * BYTES_PER_S_A_GBIT;
     let machine = Machine { bytes_per_s, ..Machine::of(scenario.costs) };
-    let equal = results.traffic.cluster(nodes, machine, results.images);
+    let traffic = Traffic { image_bytes: scenario.image_bytes, ..results.traffic };
+    let equal = traffic.cluster(nodes, machine, scenario.images);
     let speeds = if scenario.is_unequal { spread_speeds(nodes, UNEQUAL_RATIO, SEED) } else { vec![1.0; nodes] };
     let machines = equal.machines.iter().zip(&speeds).map(|(machine, &speed)| machine.faster(speed)).collect();
     let cluster = Cluster { machines, ..equal };
     let demand = Demand { views, sets: SETS, policy: PolicyChoice::Auto, tiles: None, nodes_report: true };
     let planned = plan(&cluster, &demand)?;
-    let run = run(&cluster, &planned, views, SETS, Habits::default());
+    // Groups of nodes sample sets in turn: all of them several times.
+    let groups = planned.sampler_count() / scenario.images.max(1);
+    let run = run(&cluster, &planned, views, SETS + 3 * groups as u32, Habits::default());
     let period_s = run.steady_period_s();
     let speed: f64 = speeds.iter().sum();
     Some(Simulated {
@@ -103,7 +137,7 @@ fn simulated(results: &Results, scenario: &Scenario, nodes: usize, views: usize)
         policy: planned.assignment.policy,
         samplers: planned.sampler_count(),
         period_s,
-        efficiency: efficiency(&scenario.costs, results.images, views, 1, speed * period_s),
+        efficiency: efficiency(&scenario.costs, scenario.images, views, 1, speed * period_s),
         limit: run.limit(),
     })
 }
@@ -151,6 +185,39 @@ pub fn reach_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Resu
         ])?;
     }
     Ok(table)
+}
+
+/// The set of least T at each P and V, beside the one of the measured points.
+pub fn cheapest_sets(results: &Results, points: &[Simulated]) -> anyhow::Result<Table> {
+    let columns = [
+        ("V", ""),
+        ("P", ""),
+        ("cheapest set", ""),
+        ("policy", ""),
+        ("K", ""),
+        ("T", "s"),
+        ("T of the measured set", "s"),
+    ];
+    let mut table = Table::new("Cheapest sets, simulated", &columns);
+    let measured = scenario_name(results.set);
+    for (views, nodes) in SET_VIEWS.into_iter().flat_map(|views| NODES.map(|nodes| (views, nodes))) {
+        let all = || points.iter().filter(|point| point.views == views && point.nodes == nodes);
+        let Some(cheapest) = all().min_by(|a, b| a.period_s.total_cmp(&b.period_s)) else { continue };
+        table.push([
+            views.into(),
+            nodes.into(),
+            cheapest.scenario.as_str().into(),
+            cheapest.policy.to_string().into(),
+            cheapest.samplers.into(),
+            cheapest.period_s.into(),
+            all().find(|point| point.scenario == measured).map(|point| point.period_s).into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+fn scenario_name(set: SetSize) -> String {
+    format!("S = {}, density {}", set.images, set.density)
 }
 
 /// Efficiency by P of all scenarios.

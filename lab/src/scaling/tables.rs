@@ -110,7 +110,7 @@ pub fn costs_table(results: &Results) -> anyhow::Result<Table> {
         ("most c", "ms"),
     ];
     let mut table = Table::new("Costs of one operation on one node", &columns);
-    let limited = results.timed.iter().map(|timed| (timed.nodes, results.quota_cores, &timed.costs));
+    let limited = results.timed.iter().map(|timed| (timed.nodes, timed.quota_cores, &timed.costs));
     for (nodes, cores, timings) in limited.chain([(1, results.cores, &results.unlimited)]) {
         let costs = mean(timings);
         let seconds = [
@@ -131,16 +131,33 @@ pub fn costs_table(results: &Results) -> anyhow::Result<Table> {
     Ok(table)
 }
 
+/// Costs by size of the set.
+pub fn set_costs_table(results: &Results) -> anyhow::Result<Table> {
+    let columns = [("S", ""), ("density", ""), ("S g_s", "s"), ("d", "ms"), ("c", "ms")];
+    let mut table = Table::new("Costs of sets of light on one node without a limit", &columns);
+    for (set, costs) in &results.sets {
+        table.push([
+            set.images.into(),
+            set.density.into(),
+            (set.images as f64 * costs.sample_image_s).into(),
+            (costs.load_set_s * 1e3).into(),
+            (costs.reconstruct_view_s * 1e3).into(),
+        ])?;
+    }
+    Ok(table)
+}
+
 /// 290 views by five nodes; five whole machines are predicted from the costs without a limit.
 pub fn headline_table(results: &Results) -> anyhow::Result<Table> {
     let mut table = Table::new("290 views by five nodes", &[("what", ""), ("time between sets", "s")]);
     table.push(["the paper, five GPUs".into(), HEADLINE_S.into()])?;
     let point = results.find(PolicyChoice::Pipeline, FEW_NODES, HEADLINE_VIEWS);
     if let Some(point) = point {
-        let what = format!("measured, five nodes of {:.3} cores", results.quota_cores);
+        let quota_cores = point.window.quotas_s / (point.nodes as f64 * point.window.seconds);
+        let what = format!("measured, five nodes of {quota_cores:.3} cores");
         table.push([what.into(), point.period_s.into()])?;
         let whole = mean(&results.unlimited);
-        let seconds = predicted_s(&whole, results.images, FEW_NODES, PolicyChoice::Pipeline, HEADLINE_VIEWS);
+        let seconds = predicted_s(&whole, results.set.images, FEW_NODES, PolicyChoice::Pipeline, HEADLINE_VIEWS);
         let what = format!("predicted, five machines of {:.0} cores", results.cores);
         table.push([what.into(), seconds.into()])?;
     }
