@@ -82,13 +82,13 @@ pub fn scenarios(results: &Results) -> Vec<Scenario> {
 
 /// Sets of every size on equal nodes.
 pub fn set_scenarios(results: &Results) -> Vec<Scenario> {
-    let of_set = |&(set, costs): &(SetSize, Costs)| Scenario {
-        name: scenario_name(set),
+    let scenarios = results.sets.iter().map(|(set, costs)| Scenario {
+        name: scenario_name(*set),
         images: set.images,
         image_bytes: results.traffic.image_bytes * f64::from(set.density / results.set.density).powi(2),
-        ..Scenario::new(results, costs)
-    };
-    results.sets.iter().map(of_set).collect()
+        ..Scenario::new(results, *costs)
+    });
+    scenarios.collect()
 }
 
 impl Scenario {
@@ -201,8 +201,8 @@ pub fn cheapest_sets(results: &Results, points: &[Simulated]) -> anyhow::Result<
     let mut table = Table::new("Cheapest sets, simulated", &columns);
     let measured = scenario_name(results.set);
     for (views, nodes) in SET_VIEWS.into_iter().flat_map(|views| NODES.map(|nodes| (views, nodes))) {
-        let all = || points.iter().filter(|point| point.views == views && point.nodes == nodes);
-        let Some(cheapest) = all().min_by(|a, b| a.period_s.total_cmp(&b.period_s)) else { continue };
+        let all: Vec<&Simulated> = points.iter().filter(|point| point.views == views && point.nodes == nodes).collect();
+        let Some(cheapest) = all.iter().min_by(|a, b| a.period_s.total_cmp(&b.period_s)) else { continue };
         table.push([
             views.into(),
             nodes.into(),
@@ -210,7 +210,7 @@ pub fn cheapest_sets(results: &Results, points: &[Simulated]) -> anyhow::Result<
             cheapest.policy.to_string().into(),
             cheapest.samplers.into(),
             cheapest.period_s.into(),
-            all().find(|point| point.scenario == measured).map(|point| point.period_s).into(),
+            all.iter().find(|point| point.scenario == measured).map(|point| point.period_s).into(),
         ])?;
     }
     Ok(table)
