@@ -13,6 +13,7 @@ use crate::layered::command as layered;
 use crate::lit::light_cache::{self, LightCacheArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 use crate::scene_file::{self, SceneFileArgs};
+use crate::shadows::command as shadows;
 use crate::stability::command::{self as stability, StabilityArgs};
 use crate::study::RunArgs;
 
@@ -69,6 +70,12 @@ pub enum StudyCommand {
     /// quality's time. docs/benchmarks.md says how they are measured.
     #[command(name = "light_cache")]
     LightCache(LightCacheArgs),
+    /// Repeats Tables 3 to 5 and Figs 8 and 9 of Xie et al.: soft shadows from samples of what a lamp sees
+    ///
+    /// Four scenes under a lamp of 16×16 places, by four samplings, sizes of images and lamps, and numbers of triangles. Errors are
+    /// those against shadow maps of the scene and against rays, from 0 to 255. Charts have error against time for rays, maps and
+    /// samples. docs/methods/lamp_samples.md says when to use which.
+    Shadows(RunArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
     /// Compares two reports of `study fronts`
@@ -98,6 +105,7 @@ impl StudyCommand {
             Self::Fronts(args) => fronts::run(args),
             Self::Impostors(args) => impostors::run(args),
             Self::Layered(args) => layered::run(args),
+            Self::Shadows(args) => shadows::run(args),
             Self::LightCache(args) => light_cache::run(args),
             Self::Stability(args) => stability::run(args),
             Self::Compare(args) => compare::run(args),

@@ -31,6 +31,7 @@ mod sampling_study;
 mod scaling;
 mod scene_file;
 mod section;
+mod shadows;
 mod sharing;
 mod stability;
 mod statistics;

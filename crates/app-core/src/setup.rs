@@ -63,8 +63,8 @@ pub struct SceneArgs {
     /// file
     #[arg(long, default_value_t, value_name = "x|y|z")]
     pub up: UpAxis,
-    /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
-    /// a light). Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that
+    /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, soft N (N rays
+    /// a light), or soft NxN (a grid of N by N rays a light, or, with "by maps" or "by samples", shadow maps of rectangle lights). Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that
     /// show the scene: reflections N (mirrors that a ray meets, 1 to 8). Glossy surfaces that show it, in views drawn
     /// directly, from a cube or beside a base: glossy N (rays a pixel, 1 to 256)
     #[arg(long, default_value_t, value_name = "TERMS")]

@@ -15,6 +15,7 @@ mod environment_light;
 mod environment_map;
 mod highlight;
 mod image;
+mod lamp_rig;
 mod layered;
 mod light;
 mod light_cache;
@@ -52,6 +53,7 @@ pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRRO
 pub use image::{
     BACKGROUND_INVERSE_DEPTH, DepthImage, HOLE_INVERSE_DEPTH, LightPlanes, MAX_LAMP_SHARES, SpecularPlanes, SurfaceId,
 };
+pub use lamp_rig::{LampRig, MAX_LAMP_SLOPE};
 pub use layered::LayeredDepthImage;
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use light_cache::LightCacheQuality;

@@ -35,7 +35,7 @@ fn main() -> Outcome<()> {
         let refinement = Refinement::default();
         let turn = Turn::default();
         let lighting = lighting.parse()?;
-        Ok(DrawWork { scene: &on_device, lighting, scene_time_s: 0.0, visibility, refinement, turn })
+        Ok(DrawWork { visibility, refinement, turn, ..DrawWork::new(&on_device, lighting) })
     };
     let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
     let samples = [-0.2, -0.05, 0.05, 0.2].map(|x| Camera::Pinhole(camera(x, UVec2::new(640, 480))));

@@ -12,6 +12,7 @@ use depth_image::{
     SampleImages, View, ViewPlanes,
 };
 use gpu::{DevicePreference, Gpu, GpuError};
+use lamp_samples::LampSamples;
 use node::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
     UploadedSet, ViewWork, own_time,
@@ -21,13 +22,16 @@ use reconstruction::{
     CommonSets, MirrorCell, Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, Reconstructor,
     SetDescription,
 };
-use render::{DrawWork, GpuScene, LightCache, Lighting, Refinement, RenderError, Renderer, Visibility};
+use render::{DrawWork, GpuScene, LightCache, Lighting, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
 use scene_cache::SceneCache;
 
 mod bands;
+mod lamp_samples;
 mod scene_cache;
+
+pub use lamp_samples::{LampSampling, UnknownLampSampling};
 
 /// The bound of scenes' memory where none is given.
 const SCENE_BYTES: u64 = 2 << 30;
@@ -42,6 +46,7 @@ pub struct GpuEngine {
     /// The pipelines that reconstruct, for measurements without a service in between.
     pub reconstructor: Reconstructor,
     scenes: SceneCache,
+    lamp_samples: LampSamples,
     /// Scenes load one at a time: nodes of one process need the same scene at the same moment.
     loading: Mutex<()>,
 }
@@ -103,6 +108,7 @@ impl GpuEngine {
             gpu,
             preference,
             scenes: SceneCache::new(SCENE_BYTES, GpuScene::bytes),
+            lamp_samples: LampSamples::default(),
             loading: Mutex::default(),
         })
     }
@@ -128,6 +134,7 @@ impl GpuEngine {
     pub fn opener(self: Arc<Self>) -> OpenEngine {
         let preference = self.preference;
         let scene_bytes = self.scenes.max_bytes();
+        let lamp_sampling = *self.lamp_samples.sampling.lock();
         let first = Arc::downgrade(&self);
         let open = Mutex::new((Some(self), first));
         Arc::new(move || {
@@ -138,6 +145,7 @@ impl GpuEngine {
                 None => Arc::new(Self::open(preference)?),
             };
             engine.scenes.set_max_bytes(scene_bytes);
+            engine.set_lamp_sampling(lamp_sampling);
             *open = Arc::downgrade(&engine);
             Ok(engine)
         })
@@ -146,6 +154,22 @@ impl GpuEngine {
     /// Bounds the memory of scenes to come, in bytes. One in use stays, and one beyond the bound is there alone.
     pub fn bound_scenes(&self, bytes: usize) {
         self.scenes.set_max_bytes(bytes as u64);
+    }
+
+    /// Says how lamps are sampled for light of a grid by samples, and how large shadow maps are.
+    pub fn set_lamp_sampling(&self, sampling: LampSampling) {
+        *self.lamp_samples.sampling.lock() = sampling;
+    }
+
+    /// Which places of the grid on each lamp the surface of each pixel sees, as [`Renderer::draw_lamp_bits`].
+    ///
+    /// # Errors
+    /// The scene was never loaded, has no lamps for this light, or the device.
+    pub fn lamp_bits(&self, hash: &str, lighting: Lighting, camera: &PinholeCamera) -> Result<Vec<u32>, EngineError> {
+        let scene = self.scene(hash)?;
+        let lamps = self.lamps(hash, &scene, lighting, 0.0, Turn::default())?;
+        let draw = draw_work(&scene, lighting, 0.0, Some(true), Turn::default());
+        self.catching(|| self.renderer.draw_lamp_bits(DrawWork { lamp_maps: lamps.maps(), ..draw }, camera))
     }
 
     /// Uploads a scene under the hash of its package, unless it is there.
@@ -237,7 +261,9 @@ impl GpuEngine {
         let UploadedLight { cache, scene_hash, lighting, scene_time_s, .. } = light;
         let scene = self.scene(scene_hash)?;
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
+        let lamps = self.lamps(scene_hash, &scene, *lighting, *scene_time_s, turn)?;
         let draw = draw_work(&scene, *lighting, *scene_time_s, light.by_rays(pixels), turn);
+        let draw = DrawWork { lamp_maps: lamps.maps(), ..draw };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             self.catching(|| self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes))
         })
@@ -257,7 +283,7 @@ fn draw_work(
         Some(false) => Visibility::Triangles,
         None => Visibility::Measured,
     };
-    DrawWork { scene, lighting, scene_time_s, visibility, refinement: Refinement::default(), turn }
+    DrawWork { scene_time_s, visibility, turn, ..DrawWork::new(scene, lighting) }
 }
 
 impl Engine for GpuEngine {
@@ -315,8 +341,10 @@ impl Engine for GpuEngine {
         let mirrored: Lighting = parsed("lighting", &request.lighting)?;
         // What mirrors show is each view's own.
         let lighting = mirrored.without_reflections().unwrap_or(mirrored);
+        let lamps = self.lamps(&request.scene_hash, &scene, lighting, request.scene_time_s, turn)?;
         let draw = DrawWork {
             refinement: request.refinement,
+            lamp_maps: lamps.maps(),
             ..draw_work(&scene, lighting, request.scene_time_s, request.surfaces_by_rays, turn)
         };
         let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
@@ -438,8 +466,10 @@ impl Engine for GpuEngine {
 
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
-        let lighting = parsed("lighting", &work.lighting)?;
+        let lighting: Lighting = parsed("lighting", &work.lighting)?;
+        let lamps = self.lamps(&work.scene_hash, &scene, lighting, work.scene_time_s, turn)?;
         let draw = draw_work(&scene, lighting, work.scene_time_s, work.surfaces_by_rays, turn);
+        let draw = DrawWork { lamp_maps: lamps.maps(), ..draw };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             self.catching(|| self.renderer.draw_views(draw, cameras, work.planes))
         })
@@ -486,6 +516,8 @@ impl From<RenderError> for Caught {
         Self(match error {
             RenderError::Camera { .. } | RenderError::Model { .. } => invalid("camera", error),
             RenderError::Samples { .. } => invalid("sample_images", error),
+            RenderError::LampSamples { .. } => invalid("lighting", error),
+            RenderError::LampMaps { .. } => device(error),
             RenderError::Gpu(error) => return error.into(),
             RenderError::Shader(_) => device(error),
         })

@@ -39,7 +39,7 @@ pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::CodedDepth;
 pub use quads::{ErrorBound, MeshStatistics, Quad};
 pub use ray_ends::{RayEnd, RayWork};
-pub use reconstructor::{CommonSets, ReconstructRequest, Reconstructor};
+pub use reconstructor::{CommonSets, DepthQuads, ReconstructRequest, Reconstructor};
 pub use sample_set::SampleSet;
 pub use set_description::SetDescription;
 pub use shaders::{shader_sources, shaders, templates};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::Vec2;
-use gpu::{BufferPool, Gpu, JobLimit, PassCache, Submitted, TablePool, Turn, WorkKind};
+use gpu::{BufferPool, Frame, Gpu, JobLimit, PassCache, Submitted, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
 use crate::bounce::{self, Bounces, CurvedSearch, Mirrors, RayLists};
@@ -30,6 +30,12 @@ pub struct Reconstructor {
     tables: TablePool,
     drawing: QuadDrawing,
     calls: JobLimit,
+}
+
+/// The quads of a set, cut.
+pub struct DepthQuads {
+    set: Arc<SampleSet>,
+    mesh: Arc<Mesh>,
 }
 
 /// Sets that views are made from beside their own.
@@ -274,6 +280,37 @@ impl Reconstructor {
             (Some(base), Some(lobes), Some(glossy)) => layered::follow_lobes(recording, base, lobes, glossy),
             _ => Ok(()),
         }
+    }
+
+    /// The quads that a method draws of a set, for depth alone.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::mesh_statistics`]; a method that draws no quads.
+    pub fn depth_quads(
+        &self,
+        set: Arc<SampleSet>,
+        method: ReconstructionMethod,
+        turn: Turn,
+    ) -> Result<DepthQuads, ReconstructionError> {
+        check_samples(&set, method)?;
+        let needed = "a method that draws quads: mesh or hybrid_mesh";
+        let mesh = method.mesh(&self.device, &set, turn)?;
+        let mesh = mesh.ok_or_else(|| ReconstructionError::NoSamples { what: method.to_string(), needed })?;
+        Ok(DepthQuads { set, mesh })
+    }
+
+    /// Records the depth of quads in each view into its target: the near plane over planar depth.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn record_depths(
+        &self,
+        frame: &mut Frame<'_>,
+        quads: &DepthQuads,
+        cameras: &[PinholeCamera],
+        reversed_depths: &[wgpu::TextureView],
+    ) -> Result<(), ReconstructionError> {
+        self.drawing.draw(frame, &quads.set, &quads.mesh, cameras, None, reversed_depths)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.

@@ -14,6 +14,7 @@ use crate::pixel_camera::{PixelCamera, uniform};
 use crate::{RenderError, rays::Traced, work::DrawWork};
 use crate::{
     known_samples::ImageSequence,
+    lamp_bits::{grid_stride, words_a_pixel},
     light_samples::{CachedLight, CoveredBy},
     pieces::Piece,
     planes::Output,
@@ -69,6 +70,8 @@ pub(crate) struct Recording<'a> {
     /// A uniform of the batch's cameras, with an element for each piece.
     pub cameras: wgpu::Buffer,
     pub sums: Sums,
+    /// Which places of lamps each pixel sees, where light reads that.
+    pub lamp_bits: Option<PooledBuffer>,
     pub frame: Frame<'a>,
 }
 
@@ -124,6 +127,11 @@ impl<'a> Batch<'a> {
     /// Whether its cameras are single-pole cameras.
     pub fn is_single_pole(&self) -> bool {
         matches!(self.cameras.first(), Some(Camera::SinglePole(_)))
+    }
+
+    /// Words of the bits of a pixel's rays to lamps.
+    pub fn lamp_words(&self) -> usize {
+        words_a_pixel(self.work.lighting.grid_side(), self.work.scene.light_count)
     }
 
     /// Rays into the lobe of a pixel at this position.
@@ -201,6 +209,23 @@ impl<'a> Batch<'a> {
         self.uniform(gpu, pieces, sums, &Rays { shadow, lamps: 0..self.lamps(), ambient })
     }
 
+    /// A uniform for some rays to one lamp.
+    pub fn uniform_of_lamp(
+        &self,
+        gpu: &Gpu,
+        pieces: &[Piece],
+        sums: &Sums,
+        lamp: u32,
+        shadow: Range<u32>,
+    ) -> wgpu::Buffer {
+        self.uniform(gpu, pieces, sums, &Rays { shadow, lamps: lamp..lamp + 1, ambient: 0..0 })
+    }
+
+    /// The number of the first of the pixel's rays to a lamp that this position has.
+    pub fn first_shadow_ray(&self) -> u32 {
+        self.light_rays()[0] * self.position.number
+    }
+
     /// Rays of each pixel's sequences that the sums are to hold: to lamps, and of ambient light.
     pub fn wanted_rays(&self) -> [u32; 2] {
         self.light_rays().map(|rays| self.work.refinement.share_of(rays))
@@ -230,7 +255,9 @@ impl<'a> Batch<'a> {
         let cameras = parts[0].cameras.clone();
         let sums = Sums { buffer: sums, rays };
         let frame = Frame::begin(gpu, label, self.work.turn);
-        (Recording { gpu, passes, batch: self, pieces: Vec::new(), cameras, sums, frame }, parts)
+        let recording =
+            Recording { gpu, passes, batch: self, pieces: Vec::new(), cameras, sums, lamp_bits: None, frame };
+        (recording, parts)
     }
 
     /// A camera with these rays, and those that its sums hold afterwards.
@@ -249,6 +276,9 @@ impl<'a> Batch<'a> {
             // Without rays, all light is known at once.
             shadow_rays_in_sum: shadow.end.max(1),
             ambient_rays_in_sum: ambient.end.max(1),
+            grid_side: lighting.grid_side(),
+            grid_count: lighting.grid_side().pow(2),
+            grid_stride: grid_stride(lighting.grid_side().max(1)),
             occlusion_radius_m: lighting.occlusion_radius_m().unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
             ..camera
         }
@@ -259,11 +289,14 @@ impl<'a> Batch<'a> {
         let [planes, sum_planes] = [self.output.layout().count, self.output.sums.count()].map(|count| count as u32);
         let mut first_word = 0;
         let mut first_sum = 0;
+        let mut first_pixel = 0;
         let mut placed = Vec::with_capacity(self.cameras.len());
         for camera in self.cameras {
-            let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position.offset_px) };
+            let camera =
+                PixelCamera { first_word, first_sum, first_pixel, ..PixelCamera::of(camera, self.position.offset_px) };
             first_word += camera.pixel_count * planes;
             first_sum += camera.pixel_count * sum_planes;
+            first_pixel += camera.pixel_count;
             placed.push(self.with_rays(camera, rays, &sums.rays));
         }
         let all = pieces.iter().map(|&Piece { camera, first_row, end_row, .. }| PixelCamera {
@@ -293,6 +326,7 @@ impl Recording<'_> {
         let pass = self.passes.get(variant)?;
         let mut bindings: Vec<Binding<'r>> = own.into_iter().collect();
         bindings.extend([Binding::buffer("camera", &self.cameras), Binding::buffer("sums", &self.sums.buffer)]);
+        bindings.extend(self.lamp_bits.iter().map(|bits| Binding::buffer("lamp_bits", bits)));
         bindings.extend(work.scene.bindings());
         bindings.extend(traced.iter().flat_map(|traced| traced.bindings()));
         let groups = pass.bind_all(&bindings)?;

@@ -30,6 +30,12 @@ struct PixelCamera {
     // This dispatch's lamps.
     first_light: u32,
     end_light: u32,
+    // Places of the grid on each lamp, along a side and all, and how far its rays are apart among them.
+    grid_side: u32,
+    grid_count: u32,
+    grid_stride: u32,
+    // Pixels of the batch before the camera's.
+    first_pixel: u32,
 {%- if single_pole %}
     // The pixels that a point moves for each inverse metre of depth.
     bend_px_m: f32,

@@ -14,6 +14,12 @@ pub enum RenderError {
     /// Some pictures are taken by pinholes alone.
     #[error("camera {index} is a {model}, must be a pinhole for {what}")]
     Model { index: usize, model: &'static str, what: &'static str },
+    /// Light by samples needs samples of what its lamps see.
+    #[error("lighting {lighting} needs sample images of what its rectangle lights see, and there are none")]
+    LampSamples { lighting: String },
+    /// Shadow maps cannot be drawn from samples.
+    #[error("shadow maps of a lamp: {reason}")]
+    LampMaps { reason: String },
     /// A sample image cannot be used as light.
     #[error("sample image {index}: {reason}")]
     Samples { index: usize, reason: String },

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Aabb, Highlight, MAX_LIGHTS};
+use depth_image::{Aabb, Highlight, LampRig, Light, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
 use gpu::{Binding, Gpu, GpuEnvironment, GpuError, switches};
 use indexmap::IndexSet;
@@ -103,6 +103,7 @@ pub struct GpuScene {
     pub(crate) background: wgpu::Buffer,
     pub(crate) illumination: wgpu::Buffer,
     pub(crate) light_count: usize,
+    pub(crate) lights: Vec<Light>,
     pub(crate) lamp_shares: GpuLampShares,
     /// Light and background, where a map gives them.
     pub environment: Option<Arc<GpuEnvironment>>,
@@ -117,7 +118,8 @@ pub struct GpuScene {
     /// Instances that follow nodes.
     pub(crate) motion: Option<Arc<Motion>>,
     /// Around all geometry at all times.
-    pub(crate) bounds_in_world: Aabb,
+    /// Holds all geometry at all times.
+    pub bounds_in_world: Aabb,
 }
 
 impl GpuScene {
@@ -161,6 +163,7 @@ impl GpuScene {
             background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
+            lights: scene.illumination.lights.clone(),
             lamp_shares: GpuLampShares::new(&scene.illumination),
             environment: environment.map(Arc::new),
             rays: RayScene::of(gpu, scene, &textures, &ordered, motion.clone()),
@@ -191,6 +194,12 @@ impl GpuScene {
         let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
         let environment = self.environment.as_deref().map_or(0, GpuEnvironment::bytes);
         buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + environment + self.rays.bytes() + posed
+    }
+
+    /// Cameras on each lamp, for images of this side; `None` for lamps that are no rectangles or that shine away from the scene.
+    #[must_use]
+    pub fn lamp_rigs(&self, side_px: u32) -> Vec<Option<LampRig>> {
+        self.lights.iter().map(|light| LampRig::new(light, self.bounds_in_world, side_px)).collect()
     }
 
     /// What shaders of light read of the scene.

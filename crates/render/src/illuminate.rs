@@ -29,6 +29,10 @@ pub(crate) struct Illuminate {
     shadows: bool,
     /// As many rays as the uniform says are spread over each lamp.
     soft: bool,
+    /// The places are those of a regular grid.
+    grid: bool,
+    /// Which of them are seen is known.
+    bits: bool,
     /// Rays look for surfaces that occlude the environment.
     ambient: bool,
     /// They bring what surfaces send back, too.
@@ -47,9 +51,10 @@ impl ShaderVariant for Illuminate {
 
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, .. } = *self;
-        let Self { shadows, soft, ambient, indirect, .. } = *self;
+        let Self { shadows, soft, grid, bits, ambient, indirect, .. } = *self;
         context! {
-            by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, shadows, soft, ambient, indirect,
+            by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, shadows, soft, grid, bits, ambient, indirect,
+            writes_bits => false,
             traced => self.traversal.is_some(),
             primary => indirect,
             from_eye => false,
@@ -73,7 +78,12 @@ impl ShaderVariant for Illuminate {
         let bent = lit.iter().filter(|variant| variant.by_rays && !variant.continued && !variant.environment_map);
         let bent = bent.filter(|variant| !variant.indirect && [variant.shadows, variant.soft] == [variant.ambient; 2]);
         let bent = bent.map(|variant| Self { single_pole: true, ..*variant });
-        lit.iter().copied().chain(indirect).chain(bent).flat_map(Self::with_all_sums).collect()
+        let grids = lit.iter().filter(|variant| variant.soft).flat_map(|variant| {
+            let points = [false, true].into_iter().filter(|bits| !(bits & variant.bounces));
+            points.map(|bits| Self { grid: true, bits, ..*variant })
+        });
+        let grids: Vec<Self> = grids.collect();
+        lit.iter().copied().chain(grids).chain(indirect).chain(bent).flat_map(Self::with_all_sums).collect()
     }
 }
 
@@ -94,7 +104,9 @@ impl Illuminate {
             by_rays: batch.by_rays,
             single_pole: batch.is_single_pole(),
             shadows: lighting.shadow_rays() > 0,
-            soft: matches!(lighting.direct, Direct::Soft(_)),
+            soft: matches!(lighting.direct, Direct::Soft(_) | Direct::Grid(..)),
+            grid: lighting.grid_side() > 0,
+            bits: lighting.grid_maps().is_some(),
             ambient: lighting.ambient.is_some(),
             indirect: lighting.is_indirect(),
             sums: batch.output.sums,
@@ -146,7 +158,8 @@ pub(crate) fn record_points(
 ) -> Result<(), RenderError> {
     for (number, part) in parts.iter().enumerate() {
         let of_batch = Illuminate::of(recording.batch);
-        let variant = Illuminate { by_rays: false, bounces: true, continued: number > 0, ..of_batch };
+        // Maps are asked for pixels alone.
+        let variant = Illuminate { by_rays: false, bounces: true, bits: false, continued: number > 0, ..of_batch };
         let own = [Binding::buffer("camera", &part.cameras), Binding::buffer("sums", sums)];
         let own = own.into_iter().chain(points.bindings());
         let bound = recording.bind(&variant, (part.counts, points.generation), own)?;

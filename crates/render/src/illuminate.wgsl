@@ -45,6 +45,20 @@ fn spot_of(bounce: Bounce) -> Spot {
 
 {% include "spot.wgsl" %}
 {%- endif %}
+{% if grid %}
+
+{% include "grid.wgsl" %}
+{% endif %}
+{% if bits %}
+
+// The pixel whose bits are read.
+var<private> lit_place: u32;
+
+fn is_open(lamp: u32, number: u32) -> bool {
+    let bit = bit_of(number);
+    return (lamp_bits[first_bit_word(lit_place, lamp) + bit / 32u] >> (bit % 32u) & 1u) != 0u;
+}
+{% endif %}
 
 struct Arrival { linear: vec3f, open: f32 }
 
@@ -91,10 +105,26 @@ fn from_lamp(number: u32, spot: Spot) -> Arrival {
         let place = select(vec2f(0.5), point_of(camera.first_shadow_ray + i, hashed(spot.seed + number)), is_bright(number));
 {% elif not soft %}
         let place = vec2f(0.5);
+{% elif grid and environment_map %}
+        // Bright texels are no lamp with a grid.
+        let random = point_of(camera.first_shadow_ray + i, hashed(spot.seed + number));
+        let place = select(grid_place(camera.first_shadow_ray + i), random, is_bright(number));
+{% elif grid %}
+        let place = grid_place(camera.first_shadow_ray + i);
 {% else %}
         let place = point_of(camera.first_shadow_ray + i, hashed(spot.seed + number));
 {% endif %}
+{% if bits %}
+        let incident = incident_of(number, spot, place);
+        let asks_bits = {{ "!is_bright(number)" if environment_map else "true" }};
+        let open = select(0.0, 1.0, asks_bits && is_open(number, camera.first_shadow_ray + i));
+        var ray = Arrival(incident.irradiance_linear * (max(dot(spot.normal, incident.towards), 0.0) * open), open);
+{% if environment_map %}
+        for (var asks = !asks_bits; asks; asks = false) { ray = arrival_of(incident, spot); }
+{% endif %}
+{% else %}
         let ray = arrival_of(incident_of(number, spot, place), spot);
+{% endif %}
         arrival.linear += ray.linear;
         arrival.open += ray.open;
     }
@@ -175,6 +205,8 @@ fn light_bounce(place: u32) {
 
 fn light_pixel(pixel: vec2u, knows_ambient: bool) {
     let place = place_of(pixel);
+{% if bits %}    lit_place = place;
+{% endif %}
     let depth = reversed_depth_at(pixel);
     var lamps_linear = vec3f(0.0);
     var environment = Arrival(vec3f(0.0), 0.0);

@@ -13,6 +13,7 @@ use crate::gpu_scene::{GpuObject, GpuSurroundings};
 use crate::illuminate::Illuminate;
 use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
+use crate::lamp_bits::{GpuLampMaps, GpuLampPoint, LampBits};
 use crate::lamp_shares::GpuLampShares;
 use crate::layered::{Crossing, GpuLines};
 use crate::light_cache::LookUp;
@@ -112,6 +113,17 @@ fn a_known_camera_has_the_wgsl_layout() {
 }
 
 #[test]
+fn cameras_on_lamps_have_the_wgsl_layout() {
+    let maps =
+        host!(GpuLampMaps { right_in_world, side_px, down_in_world, focal_x_px, forward_in_world, focal_y_px, points });
+    let point = host!(GpuLampPoint { eye_in_world, near_m, principal_px, padding });
+    let asked = LampBits::all().into_iter().find(|variant| variant.maps).expect("a variant");
+    let asked = parsed(&asked);
+    assert_eq!(shader(&asked, "LampMaps"), maps);
+    assert_eq!(shader(&asked, "LampPoint"), point);
+}
+
+#[test]
 fn a_pixel_camera_has_the_wgsl_layout() {
     let host = host!(PixelCamera {
         eye_in_world,
@@ -137,6 +149,10 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         end_row,
         first_light,
         end_light,
+        grid_side,
+        grid_count,
+        grid_stride,
+        first_pixel,
         bend_px_m,
         pole_px,
         farthest_m,
@@ -249,9 +265,12 @@ const BOUND: &[&str] = &[
     "kept",
     "known_cameras",
     "known_samples",
+    "lamp_bits",
+    "lamp_maps",
     "list",
     "listed_pixels",
     "lobe",
+    "maps",
     "materials",
     "next",
     "next_bounces",

@@ -12,6 +12,9 @@ pub const MAX_RAYS: u32 = 4096;
 const LEAST_RAYS_HERE: NonZeroU32 = NonZeroU32::new(16).unwrap();
 const LEAST_RAYS_IN_MOTION: NonZeroU32 = NonZeroU32::new(4).unwrap();
 
+/// Most points of a grid on a lamp, along a side.
+pub const MAX_GRID_SIDE: u32 = 32;
+
 /// Most rays of a lobe, a pixel.
 pub const MAX_GLOSSY_RAYS: u32 = 256;
 
@@ -41,6 +44,20 @@ pub enum Direct {
     Shadows,
     /// This many rays to places spread over every lamp.
     Soft(NonZeroU32),
+    /// A regular grid of places on every lamp, with this many along a side (Xie et al., Algorithm 5).
+    Grid(NonZeroU32, GridAnswer),
+}
+
+/// How a grid on a rectangle is asked which of its places a point sees; other lamps are asked by rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum GridAnswer {
+    /// One ray to each place.
+    #[default]
+    Rays,
+    /// A shadow map of the scene from each place.
+    Maps,
+    /// A shadow map from each place, of what sample images from the lamp hold.
+    Samples,
 }
 
 /// Light from all around, by cosine-weighted rays a pixel.
@@ -58,7 +75,7 @@ pub enum Ambient {
 #[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
     #[error(
-        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, indirect N, reflections N and glossy N with commas between them"
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, soft NxN [by rays|maps|samples], occlusion N, occlusion N RADIUSm, indirect N, reflections N and glossy N with commas between them"
     )]
     Term(String),
     #[error("lighting {0:?}: {1} must be from 1 to {2}")]
@@ -92,6 +109,23 @@ impl Lighting {
             Direct::Unlit | Direct::Phong => 0,
             Direct::Shadows => 1,
             Direct::Soft(rays) => rays.get(),
+            Direct::Grid(side, _) => side.get() * side.get(),
+        }
+    }
+
+    /// Places along a side of the grid on every lamp; 0 for other light.
+    #[must_use]
+    pub fn grid_side(&self) -> u32 {
+        if let Direct::Grid(side, _) = self.direct { side.get() } else { 0 }
+    }
+
+    /// Where shadow maps of rectangles come from; `None` for light that needs none.
+    #[must_use]
+    pub fn grid_maps(&self) -> Option<GridAnswer> {
+        if let Direct::Grid(_, maps @ (GridAnswer::Maps | GridAnswer::Samples)) = self.direct {
+            Some(maps)
+        } else {
+            None
         }
     }
 
@@ -152,6 +186,7 @@ impl Lighting {
     fn with_rays(&self, rays: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
         let direct = match self.direct {
             Direct::Soft(to_lamps) => Direct::Soft(rays(to_lamps)),
+            Direct::Grid(side, answer) => Direct::Grid(side_of_square(rays(side.saturating_mul(side))), answer),
             other => other,
         };
         let ambient = self.ambient.map(|ambient| match ambient {
@@ -179,7 +214,7 @@ impl Lighting {
         match self.direct {
             Direct::Unlit => None,
             Direct::Phong => Some(Highlight::BlinnPhong),
-            Direct::Shadows | Direct::Soft(_) => Some(Highlight::Ggx),
+            Direct::Shadows | Direct::Soft(_) | Direct::Grid(..) => Some(Highlight::Ggx),
         }
     }
 
@@ -203,7 +238,14 @@ impl FromStr for Lighting {
                 ["unlit"] => direct.replace(Direct::Unlit).is_some(),
                 ["phong"] => direct.replace(Direct::Phong).is_some(),
                 ["shadows"] => direct.replace(Direct::Shadows).is_some(),
-                ["soft", n] => direct.replace(Direct::Soft(count(text, n, "rays", MAX_RAYS)?)).is_some(),
+                ["soft", n] if !n.contains('x') => {
+                    direct.replace(Direct::Soft(count(text, n, "rays", MAX_RAYS)?)).is_some()
+                }
+                ["soft", n] => direct.replace(Direct::Grid(grid_side(text, n)?, GridAnswer::Rays)).is_some(),
+                ["soft", n, "by", answer] => {
+                    let answer = GridAnswer::named(answer).ok_or_else(|| UnknownLighting::Term(term.to_owned()))?;
+                    direct.replace(Direct::Grid(grid_side(text, n)?, answer)).is_some()
+                }
                 ["occlusion", n] => {
                     ambient.replace(Ambient::Occlusion(count(text, n, "rays", MAX_RAYS)?, None)).is_some()
                 }
@@ -247,6 +289,30 @@ fn count(text: &str, number: &str, what: &'static str, most: u32) -> Result<NonZ
     count.ok_or_else(|| UnknownLighting::Count(text.to_owned(), what, most))
 }
 
+/// The side of a square grid, as in `16x16`.
+fn grid_side(text: &str, sides: &str) -> Result<NonZeroU32, UnknownLighting> {
+    let what = "points along each side of a grid NxN, with N";
+    let (columns, rows) = sides.split_once('x').unwrap_or((sides, ""));
+    if columns != rows {
+        return Err(UnknownLighting::Conflict(text.to_owned(), "a grid has as many columns as rows"));
+    }
+    count(text, columns, what, MAX_GRID_SIDE)
+}
+
+/// The side of the largest square of no more than so many places.
+fn side_of_square(places: NonZeroU32) -> NonZeroU32 {
+    NonZeroU32::new(places.get().isqrt()).unwrap_or(NonZeroU32::MIN)
+}
+
+impl GridAnswer {
+    /// All with their words.
+    const NAMES: [(Self, &str); 3] = [(Self::Rays, "rays"), (Self::Maps, "maps"), (Self::Samples, "samples")];
+
+    fn named(word: &str) -> Option<Self> {
+        Self::NAMES.into_iter().find(|(_, name)| *name == word).map(|(answer, _)| answer)
+    }
+}
+
 /// A quarter of a number of rays, at least one.
 fn quarter_of(rays: NonZeroU32) -> NonZeroU32 {
     NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN)
@@ -259,6 +325,9 @@ impl fmt::Display for Lighting {
             Direct::Phong => write!(f, "phong")?,
             Direct::Shadows => write!(f, "shadows")?,
             Direct::Soft(rays) => write!(f, "soft {rays}")?,
+            Direct::Grid(side, GridAnswer::Rays) => write!(f, "soft {side}x{side}")?,
+            Direct::Grid(side, GridAnswer::Maps) => write!(f, "soft {side}x{side} by maps")?,
+            Direct::Grid(side, GridAnswer::Samples) => write!(f, "soft {side}x{side} by samples")?,
         }
         match self.ambient {
             Some(Ambient::Occlusion(rays, Some(radius_m))) => write!(f, ", occlusion {rays} {radius_m}m")?,
@@ -296,9 +365,13 @@ mod tests {
             "soft 16, occlusion 16, reflections 2",
             "shadows, glossy 256",
             "soft 16, occlusion 16, reflections 2, glossy 16",
+            "soft 16x16",
+            "soft 32x32 by maps, occlusion 16",
+            "soft 1x1 by samples",
         ] {
             assert_eq!(name.parse::<Lighting>().expect(name).to_string(), name);
         }
+        assert_eq!("soft 4x4 by rays".parse::<Lighting>().expect("a grid").to_string(), "soft 4x4");
         assert_eq!("occlusion 4".parse::<Lighting>().expect("alone").to_string(), "phong, occlusion 4");
     }
 
@@ -330,6 +403,11 @@ mod tests {
         ] {
             assert!(matches!(parsed(text), Term(_)), "{text}");
         }
+        for text in ["soft 0x0", "soft 33x33", "soft x", "soft -1x-1", "soft 4x4x"] {
+            assert!(matches!(parsed(text), Count(..) | Conflict(..)), "{text}");
+        }
+        assert!(parsed("soft 16x8").to_string().contains("as many columns as rows"));
+        assert!(matches!(parsed("soft 16x16 by guess"), Term(_)) && matches!(parsed("soft 16 by"), Term(_)));
         for text in ["occlusion 4 -1m", "occlusion 4 NaN", "occlusion 4 0m"] {
             assert!(matches!(parsed(text), Radius(_)), "{text}");
         }
@@ -362,6 +440,7 @@ mod tests {
         assert_eq!(here("shadows, occlusion 64, reflections 2", balanced), "shadows, occlusion 16, reflections 2");
         assert_eq!(here("soft 128, occlusion 64", LightCacheQuality::Fine), "soft 128, occlusion 64");
         assert_eq!(here("soft 128, occlusion 8", LightCacheQuality::Fast), "soft 32, occlusion 4");
+        assert_eq!(here("soft 16x16 by maps", balanced), "soft 8x8 by maps");
     }
 
     #[test]

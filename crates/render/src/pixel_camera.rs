@@ -36,6 +36,12 @@ pub(crate) struct PixelCamera {
     /// The lamps of a dispatch.
     pub first_light: u32,
     pub end_light: u32,
+    /// Places of the grid on each lamp, along a side and all, and how far its rays are apart among them.
+    pub grid_side: u32,
+    pub grid_count: u32,
+    pub grid_stride: u32,
+    /// Pixels of the batch before the camera's.
+    pub first_pixel: u32,
     /// Of a single-pole camera, as the two numbers that follow.
     pub bend_px_m: f32,
     pub pole_px: [f32; 2],

@@ -37,6 +37,8 @@ pub(crate) struct Output {
     pub covered: bool,
     /// Whether redundant surfaces lie before the sample.
     pub passed: bool,
+    /// Which places of lamps pixels see is read in place of the planes.
+    pub lamp_bits: bool,
 }
 
 /// The places of planes among those of a camera, after colour (0) and inverse depth (1).

@@ -43,6 +43,8 @@ pub(crate) struct RasterVariant {
     depth_only: bool,
     wind: bool,
     redundancy: Option<RedundancyVariant>,
+    /// Triangles are drawn from behind, whatever their material is.
+    both_faces: bool,
     /// All that the lines of a parallel camera meet is kept.
     pub appended: bool,
 }
@@ -84,7 +86,8 @@ impl RasterVariant {
 
     /// Of a plain material, without any plane beside the surface.
     fn of(work: &DrawWork<'_>) -> Self {
-        Self { shading: work.lighting.highlight(), wind: work.scene.wind, ..Self::default() }
+        let both_faces = work.both_faces;
+        Self { shading: work.lighting.highlight(), wind: work.scene.wind, both_faces, ..Self::default() }
     }
 
     fn has_own_group(&self) -> bool {
@@ -96,10 +99,11 @@ impl ShaderVariant for RasterVariant {
     const TEMPLATE: &'static str = "raster.wgsl";
 
     fn context(&self) -> Value {
-        let Self { material, shading, surface_id, triangle_normal, depth_only, wind, redundancy, appended } = *self;
+        let Self { material, shading, surface_id, triangle_normal, depth_only, wind, redundancy, both_faces, appended } =
+            *self;
         let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } = material;
         context! {
-            surface_id, triangle_normal, depth_only, wind, appended,
+            surface_id, triangle_normal, depth_only, wind, both_faces, appended,
             double_sided, alpha_tested, textured, unlit, specular, mapped,
             shading => shading.map_or("unlit", highlight_name),
             coat_textured => coat_textured && shading == Some(Highlight::Ggx),
@@ -129,7 +133,7 @@ impl DrawVariant for RasterVariant {
         color_formats.extend((!self.depth_only && !self.appended).then_some(SURFACE_FORMAT));
         color_formats.extend((!self.depth_only && self.surface_id).then_some(SURFACE_ID_FORMAT));
         color_formats.extend((!self.depth_only && self.triangle_normal).then_some(TRIANGLE_NORMAL_FORMAT));
-        let cull_mode = (!self.material.double_sided && !self.appended).then_some(wgpu::Face::Back);
+        let cull_mode = (!self.material.double_sided && !self.both_faces && !self.appended).then_some(wgpu::Face::Back);
         let details = self.material.mapped.then(|| layout::<VertexDetail>(&DETAIL_ATTRIBUTES));
         let vertices = [layout::<Vertex>(&VERTEX_ATTRIBUTES)].into_iter().chain(details).collect();
         DrawState { vertices, cull_mode, color_formats, nearest_only: !self.appended }
@@ -175,6 +179,28 @@ impl Raster {
             let planes = target.surface_ids.iter().chain(&target.views.triangle_normals);
             let colors: Vec<_> = std::iter::once(&target.views.surfaces).chain(planes).collect();
             self.draw_in_slices(frame, &view, shown, &colors, &target.views.reversed_depth)?;
+        }
+        Ok(())
+    }
+
+    /// Records the depth of what each camera sees, from both sides.
+    pub fn record_maps(
+        &self,
+        frame: &mut Frame<'_>,
+        work: &DrawWork<'_>,
+        cameras: &[PinholeCamera],
+        reversed_depths: &[wgpu::TextureView],
+    ) -> Result<(), RenderError> {
+        let scene = work.scene;
+        let variant = RasterVariant { depth_only: true, both_faces: true, ..RasterVariant::of(work) };
+        let all = cameras.iter().map(|camera| RasterCamera::of(camera, work.scene_time_s));
+        let groups = self.groups(scene, variant, all, None)?;
+        let posed = scene.motion.as_ref().map(|motion| motion.at(work.scene_time_s));
+        let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
+        for (place, (camera, reversed_depth)) in (0..).zip(cameras.iter().zip(reversed_depths)) {
+            let frustum = Frustum::of(camera);
+            let view = View { scene, posed, place, size_px: camera.size_px, frustum, groups: groups.as_ref() };
+            self.draw_in_slices(frame, &view, variant, &[], reversed_depth)?;
         }
         Ok(())
     }

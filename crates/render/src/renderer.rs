@@ -12,6 +12,7 @@ use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
 use crate::known_samples::{ImageSequence, KnownSamples};
+use crate::lamp_bits::words_a_pixel;
 use crate::layered;
 use crate::light_samples::{CachedLight, CoveredBy, LightCache, LookUpTests};
 use crate::planes::{self, Output};
@@ -19,7 +20,7 @@ use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, LayerSelection, SamplePlanes};
 use crate::{
-    GpuScene, Lighting, Refinement, RenderError,
+    GpuScene, GridAnswer, Lighting, RenderError,
     layers::{self, LayerKind, Layers},
     redundancy_test::RedundancyTest,
     stages::Stages,
@@ -262,6 +263,21 @@ impl Renderer {
         Ok(images)
     }
 
+    /// Which places of the grid on each lamp the surface of each pixel sees: [`scalar::bits_of_lamp`](crate::scalar::bits_of_lamp)
+    /// reads them. No bits without a grid.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_views`].
+    pub fn draw_lamp_bits(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<Vec<u32>, RenderError> {
+        let cameras = [Camera::from(*camera)];
+        self.check(&cameras)?;
+        let output = Output { lamp_bits: true, ..Output::of(work, false) };
+        let words = camera.pixel_count() * words_a_pixel(work.lighting.grid_side(), work.scene.light_count);
+        let bits =
+            self.draw(Batch::new(work, output), &cameras, |read, _| vec![read[..words.min(read.len())].to_vec()])?;
+        Ok(bits.concat())
+    }
+
     /// Batch after batch; `read` makes pictures of the words of one.
     fn draw<T>(
         &self,
@@ -270,7 +286,7 @@ impl Renderer {
         read: impl Fn(&[u32], &[Camera]) -> Vec<T>,
     ) -> Result<Vec<T>, RenderError> {
         let mut pictures = Vec::with_capacity(cameras.len());
-        for cameras in batches(cameras, self.most_pixels(request.output)) {
+        for cameras in batches(cameras, self.most_pixels(&request)) {
             let sequence = request.sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
             let covered_by = request.covered_by.map(|set| CoveredBy { first: pictures.len(), ..set });
             let batch = self.batch(Batch { sequence, covered_by, ..request.clone() }, cameras)?;
@@ -286,10 +302,7 @@ impl Renderer {
     /// # Errors
     /// The device's.
     pub fn choice(&self, scene: &GpuScene, camera: &PinholeCamera, scene_time_s: f32) -> Result<Choice, RenderError> {
-        let lighting = Lighting::UNLIT;
-        let refinement = Refinement::default();
-        let turn = Turn::default();
-        let work = DrawWork { scene, lighting, scene_time_s, visibility: Visibility::Measured, refinement, turn };
+        let work = DrawWork { scene_time_s, ..DrawWork::new(scene, Lighting::UNLIT) };
         Ok(self.costs(work, camera)?.at(camera.pixel_count()))
     }
 
@@ -384,15 +397,21 @@ impl Renderer {
             Visibility::Measured if is_drawn_at_each_moment(work) => false,
             Visibility::Measured => self.is_by_rays(work, cameras[0].reference())?,
         };
+        let lighting = work.lighting;
+        if lighting.grid_maps() == Some(GridAnswer::Samples) && work.lamp_maps.samples.is_none() {
+            return Err(RenderError::LampSamples { lighting: lighting.to_string() });
+        }
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
         Ok(Batch { cameras, by_rays, traced, ..request })
     }
 
     /// The pixels for which no buffer of a batch is larger than the device binds.
-    fn most_pixels(&self, output: Output) -> usize {
+    fn most_pixels(&self, request: &Batch<'_>) -> usize {
+        let output = request.output;
         let bytes = self.gpu.most_storage_bytes() as usize;
-        PIXELS_A_SUBMISSION.min(bytes / (4 * output.layout().count.max(output.sums.count())))
+        let planes = output.layout().count.max(output.sums.count()).max(request.lamp_words());
+        PIXELS_A_SUBMISSION.min(bytes / (4 * planes))
     }
 }
 

@@ -12,6 +12,8 @@ use crate::{
     finish::{Finish, SAME_SURFACE},
     illuminate::Illuminate,
     keep::Keep,
+    lamp_bits::LampBits,
+    lamp_maps::MAPS_AT_ONCE,
     layered::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, Lit},
     light_cache::{LookUp, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE},
     light_samples::MAX_CACHE_CAMERAS,
@@ -31,7 +33,7 @@ const MAX_LAMP_SHARES: u32 = depth_image::MAX_LAMP_SHARES as u32;
 /// The shader templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sums.wgsl",
-    "illuminate.wgsl", "indirect.wgsl", "light_cache.wgsl", "cached_texels.wgsl", "coverage.wgsl", "lamp_shares.wgsl", "pixel_list.wgsl", "triangle_normal.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
+    "illuminate.wgsl", "lamp_bits.wgsl", "grid.wgsl", "indirect.wgsl", "light_cache.wgsl", "cached_texels.wgsl", "coverage.wgsl", "lamp_shares.wgsl", "pixel_list.wgsl", "triangle_normal.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/ends.wgsl", "reflections/curvature.wgsl",
     "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl", "reflections/lobe.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
@@ -46,7 +48,7 @@ pub(crate) const DYNAMIC_UNIFORMS: DynamicUniforms = &["camera", "object"];
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
     Ok(Templates::new(&[SHADERS, tests].concat())?.with_dynamic_uniforms(DYNAMIC_UNIFORMS).declaring(wgsl_constants! {
-        ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MAX_CACHE_CAMERAS, MAX_LAMP_SHARES, MIRROR, MOST_COARSER, MOST_LAYERS,
+        ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MAPS_AT_ONCE, MATERIAL_TEXELS, MAX_CACHE_CAMERAS, MAX_LAMP_SHARES, MIRROR, MOST_COARSER, MOST_LAYERS,
         NOTHING, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
     }))
 }
@@ -62,6 +64,7 @@ pub fn shader_sources<'t>(
         Primary,
         Keep,
         Illuminate,
+        LampBits,
         LookUp,
         Coverage,
         Spawn,

@@ -9,11 +9,12 @@ use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
+use crate::lamp_maps::{self, MapPool};
 use crate::light_cache::{self, Picture};
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
 use crate::surfaces::{MOST_FREE_BYTES, SurfaceKind, SurfaceViews, Surfaces};
-use crate::{RenderError, coverage, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
+use crate::{RenderError, coverage, finish, illuminate, keep, lamp_bits, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
 
 /// Batches of one class that are under way at once: each holds memory for its surfaces, light and planes.
@@ -25,6 +26,7 @@ pub(crate) struct Stages {
     pub pool: BufferPool,
     surfaces: Pool<SurfaceKind, SurfaceViews>,
     accumulations: Accumulations,
+    maps: MapPool,
     pub raster: Raster,
     pub passes: PassCache,
     pub batches: JobLimit,
@@ -37,6 +39,7 @@ impl Stages {
             pool: BufferPool::new(gpu),
             surfaces: Pool::of_device(gpu, MOST_FREE_BYTES, SurfaceKind::bytes),
             accumulations: Accumulations::default(),
+            maps: lamp_maps::pool(gpu),
             raster: Raster::new(gpu, templates),
             passes: PassCache::new(gpu, templates),
             batches: JobLimit::of(BATCHES_OF_A_CLASS),
@@ -61,7 +64,8 @@ impl Stages {
             shifted.iter().map(|(position, cameras)| Batch { cameras, position: *position, ..batch.clone() });
         let positions: Vec<Batch<'_>> = positions.collect();
         let frame = Frame::begin(gpu, "draw", turn);
-        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
+        let lamp_bits = lamp_bits::lend(pool, batch);
+        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, lamp_bits, frame };
         let surfaces: Vec<Surfaces> = (0..batch.cameras.len()).map(|place| self.lend(batch, place)).collect();
         let planes = Planes::lend(gpu, pool, batch)?;
         let mut lists = Vec::new();
@@ -70,11 +74,16 @@ impl Stages {
             recording.batch = position;
             lists.extend(self.record_position(&mut recording, &surfaces, &planes, mirrored.as_ref())?);
         }
-        let Recording { sums, mut frame, .. } = recording;
-        let bytes = batch.bytes(batch.output.layout().count);
-        let read = frame.read_back(&planes.words, 0..bytes, pool.lend_host("planes read-back", bytes.max(4)));
+        let Recording { sums, lamp_bits, mut frame, .. } = recording;
+        let wanted_bits = lamp_bits.as_deref().filter(|_| batch.output.lamp_bits);
+        let bytes = match wanted_bits {
+            Some(_) => batch.bytes(batch.lamp_words()),
+            None => batch.bytes(batch.output.layout().count),
+        };
+        let host = pool.lend_host("planes read-back", bytes.max(4));
+        let read = frame.read_back(wanted_bits.unwrap_or(&planes.words), 0..bytes, host);
         let result = frame.submit()?.wait()?;
-        drop((surfaces, lists, planes, mirrored));
+        drop((surfaces, lists, planes, mirrored, lamp_bits));
         if batch.work.refinement.goes_on() {
             self.accumulations.put(batch.key(), sums);
         }
@@ -174,6 +183,9 @@ impl Stages {
     ) -> Result<Vec<PixelList>, RenderError> {
         let batch = recording.batch;
         let mut all = Vec::new();
+        if batch.work.lighting.is_lit() && batch.has_color() {
+            lamp_bits::record(recording, &self.raster, &self.maps, surfaces)?;
+        }
         if let Some(covered_by) = batch.covered_by {
             let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
             for (camera, target) in surfaces.iter().enumerate() {

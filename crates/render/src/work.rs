@@ -3,6 +3,7 @@
 use depth_image::{Antialias, Highlight, Refinement};
 use gpu::Turn;
 
+use crate::lamp_maps::LampMaps;
 use crate::{GpuScene, Lighting, Visibility};
 
 /// A scene at a moment, and how it is drawn.
@@ -19,6 +20,27 @@ pub struct DrawWork<'a> {
     pub refinement: Refinement,
     /// The place in the device's order.
     pub turn: Turn,
+    /// Triangles are drawn from behind, too, as rays meet them.
+    pub both_faces: bool,
+    /// The shadow maps of light that asks them.
+    pub lamp_maps: LampMaps<'a>,
+}
+
+impl<'a> DrawWork<'a> {
+    /// A scene at its start, finished at once, surfaces found by whichever way is faster.
+    #[must_use]
+    pub fn new(scene: &'a GpuScene, lighting: Lighting) -> Self {
+        Self {
+            scene,
+            lighting,
+            scene_time_s: 0.0,
+            visibility: Visibility::Measured,
+            refinement: Refinement::default(),
+            turn: Turn::default(),
+            both_faces: false,
+            lamp_maps: LampMaps::default(),
+        }
+    }
 }
 
 impl DrawWork<'_> {

@@ -6,7 +6,7 @@ use depth_image::{Camera, DepthImage, Highlight, PinholeCamera, View, ViewPlanes
 use engine::GpuEngine;
 use glam::UVec2;
 use reconstruction::{Reconstructor, SetDescription};
-use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, Lighting, SamplePlanes, Visibility};
 use sampling::{SampleWork, Sampler, SamplingMethod};
 use scene::Scene;
 
@@ -108,12 +108,5 @@ pub fn description(scene: &Scene, highlight: Option<Highlight>) -> SetDescriptio
 
 /// By triangles, so that no measurement of times decides what is drawn.
 pub fn work(scene: &GpuScene, lighting: Lighting) -> DrawWork<'_> {
-    DrawWork {
-        scene,
-        lighting,
-        scene_time_s: 0.0,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    }
+    DrawWork { visibility: Visibility::Triangles, ..DrawWork::new(scene, lighting) }
 }

@@ -10,7 +10,7 @@ use app_core::print_line;
 use app_core::process::StopSignals;
 use app_core::setup::DeviceArgs;
 use clap::Args;
-use engine::GpuEngine;
+use engine::{GpuEngine, LampSampling};
 use node::{Engine as _, NodeConfig, NodeMetrics, Telemetry};
 
 /// Joins a coordinator, and samples and composites by its plan. Joins again when the coordinator comes back.
@@ -34,6 +34,10 @@ pub struct NodeArgs {
     device: DeviceArgs,
     #[command(flatten)]
     limits: NodeLimitArgs,
+    /// How rectangle lights are sampled under "soft NxN by samples": a sampling method, the side of images and shadow maps,
+    /// and mesh or hybrid_mesh[:PX]
+    #[arg(long, value_name = "SAMPLING SIDE METHOD", default_value_t)]
+    lamp_samples: LampSampling,
     #[command(flatten)]
     metrics: MetricsArgs,
     #[command(flatten)]
@@ -51,6 +55,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     let engine = GpuEngine::shared(args.device.device)?;
     let memory = args.limits.set_memory_bytes(engine.is_software());
     engine.bound_scenes(memory);
+    engine.set_lamp_sampling(args.lamp_samples);
     let name = args.name.unwrap_or_else(|| name_of(address));
     let advertise = args.advertise.or_else(|| own_address(&coordinator, address));
     print_line!("{name} on {}, at http://{address}", engine.device_name());

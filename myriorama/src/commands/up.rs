@@ -11,7 +11,7 @@ use app_core::process::StopSignals;
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
 use clap::Args;
-use engine::GpuEngine;
+use engine::{GpuEngine, LampSampling};
 use node::Engine as _;
 
 use crate::serving::ServingArgs;
@@ -28,6 +28,10 @@ pub struct UpArgs {
     device: DeviceArgs,
     #[command(flatten)]
     limits: NodeLimitArgs,
+    /// How rectangle lights are sampled under "soft NxN by samples": a sampling method, the side of images and shadow maps,
+    /// and mesh or hybrid_mesh[:PX]
+    #[arg(long, value_name = "SAMPLING SIDE METHOD", default_value_t)]
+    lamp_samples: LampSampling,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
@@ -49,6 +53,7 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let memory = args.limits.set_memory_bytes(engine.is_software());
     let nodes = usize::from(args.nodes);
     engine.bound_scenes(memory);
+    engine.set_lamp_sampling(args.lamp_samples);
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         engine.put_scene(offer.hash.as_str(), scene)?;
         print_line!("{}: {}", offer.name, scene.contents());

@@ -133,6 +133,18 @@ impl ReconstructionMethod {
     /// Walks through a layered cube, and follows all mirrors.
     pub const LAYERED: Self = Layered { followed: None };
 
+    /// Draws the shadow maps of lamps where none is named.
+    #[must_use]
+    pub fn lamp_default() -> Self {
+        HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }
+    }
+
+    /// Whether views are drawn as quads of the samples.
+    #[must_use]
+    pub fn draws_quads(self) -> bool {
+        matches!(self, Mesh | HybridMesh { .. })
+    }
+
     /// Sample images need normals and the inverse depths at corners of texels, beside colour and depth.
     #[must_use]
     pub fn needs_corners(self) -> bool {

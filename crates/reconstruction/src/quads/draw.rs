@@ -5,14 +5,18 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{Vec3, Vec4};
-use gpu::{Binding, DrawPass, DrawState, DrawVariant, Gpu, GpuError, PassCache, Pool, Templates, WorkKind};
-use gpu::{shader_variant, uniform_elements, uniform_stride};
+use gpu::{
+    Binding, DrawPass, DrawState, DrawVariant, DynamicUniforms, Frame, Gpu, GpuError, PassCache, Pool, ShaderVariant,
+    Templates,
+};
+use gpu::{WorkKind, uniform_elements, uniform_stride};
+use minijinja::{Value, context, value::merge_maps};
 use wgpu::BufferUsages;
 
 use super::mesh::{ImageQuads, Mesh, QuadVertices};
 use super::targets::{QuadTargets, SAMPLE_FORMAT, TargetKind, Targets, target_bytes};
 use crate::view_work::{GpuViewCamera, ONE_VIEW};
-use crate::{error::ReconstructionError, recording::Recording};
+use crate::{error::ReconstructionError, recording::Recording, sample_set::SampleSet};
 
 /// The most bytes of free targets: those of a few batches.
 const MOST_FREE_BYTES: u64 = 64 << 20;
@@ -31,7 +35,26 @@ pub(crate) struct GpuQuadWork {
     pub padding: [u32; 2],
 }
 
-shader_variant!(DrawQuads(QuadVertices), "draw.wgsl", ONE_VIEW);
+/// Quads with their samples, or their depth alone.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DrawQuads {
+    vertices: QuadVertices,
+    depth_only: bool,
+}
+
+impl ShaderVariant for DrawQuads {
+    const TEMPLATE: &'static str = "draw.wgsl";
+    const DYNAMIC_UNIFORMS: DynamicUniforms = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        merge_maps([self.vertices.context(), context! { depth_only => self.depth_only }])
+    }
+
+    fn all() -> Vec<Self> {
+        let all = QuadVertices::all().into_iter();
+        all.flat_map(|vertices| [false, true].map(|depth_only| Self { vertices, depth_only })).collect()
+    }
+}
 
 impl DrawVariant for DrawQuads {
     fn state(&self) -> DrawState {
@@ -41,19 +64,22 @@ impl DrawVariant for DrawQuads {
             attributes: &INVERSE_DEPTH,
         };
         // Both faces: a view may see a surface from behind its sample camera.
-        DrawState { vertices: vec![vertices], cull_mode: None, color_formats: vec![SAMPLE_FORMAT], nearest_only: true }
+        let color_formats = if self.depth_only { Vec::new() } else { vec![SAMPLE_FORMAT] };
+        DrawState { vertices: vec![vertices], cull_mode: None, color_formats, nearest_only: true }
     }
 }
 
 /// Drawing passes, and the targets of the last batches: most are alike.
 pub(crate) struct QuadDrawing {
+    gpu: Arc<Gpu>,
     passes: PassCache<DrawPass>,
     targets: Pool<TargetKind, Targets>,
 }
 
 impl QuadDrawing {
     pub fn new(gpu: &Arc<Gpu>, templates: &Arc<Templates>) -> Self {
-        Self { passes: PassCache::new(gpu, templates), targets: Pool::of_device(gpu, MOST_FREE_BYTES, target_bytes) }
+        let targets = Pool::of_device(gpu, MOST_FREE_BYTES, target_bytes);
+        Self { gpu: gpu.clone(), passes: PassCache::new(gpu, templates), targets }
     }
 
     fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<QuadTargets, GpuError> {
@@ -64,6 +90,41 @@ impl QuadDrawing {
         GpuError::check_limit("views drawn together", views.into(), limits.max_texture_array_layers.into())?;
         Ok(self.targets.lend(kind, |&kind| Targets::new(gpu, kind)))
     }
+
+    /// Records every image's quads in each view: depth, and the samples that are seen where there are targets for them.
+    pub fn draw(
+        &self,
+        frame: &mut Frame<'_>,
+        set: &SampleSet,
+        mesh: &Mesh,
+        cameras: &[PinholeCamera],
+        samples: Option<&[wgpu::TextureView]>,
+        depths: &[wgpu::TextureView],
+    ) -> Result<(), ReconstructionError> {
+        let quads = self.passes.get(&DrawQuads { vertices: mesh.cut.vertices, depth_only: samples.is_none() })?;
+        let works = self.gpu.buffer_with("quads of views", &quad_works(set, cameras), BufferUsages::UNIFORM);
+        let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
+        let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
+        let kind = WorkKind::new(family(), &format!("{:?}", mesh.cut));
+        for (view, depth) in depths[..cameras.len()].iter().enumerate() {
+            let colors: Vec<&wgpu::TextureView> = samples.iter().map(|samples| &samples[view]).collect();
+            for (number, images) in slices(&self.gpu, mesh).enumerate() {
+                let clear = (number == 0).then_some(wgpu::Color::TRANSPARENT);
+                quads.announce(frame, &[&bound]);
+                let mut pass = frame.begin_drawing("quads", &colors, clear, depth);
+                pass.set_pipeline(quads.pipeline());
+                for (image, offset) in images.iter().zip(&mut offsets) {
+                    pass.set_bind_group(0, &*bound, &[offset]);
+                    pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
+                    pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
+                    pass.draw_indexed_indirect(&image.draw, 0);
+                }
+                drop(pass);
+                frame.cut(kind, images.iter().map(vertices).sum());
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Draws all images' quads into every view, in the targets of the batch.
@@ -73,29 +134,17 @@ pub(super) fn record(
     mesh: &Mesh,
 ) -> Result<(), ReconstructionError> {
     let gpu = &recording.device.gpu;
-    let quads = drawing.passes.get(&DrawQuads(mesh.cut.vertices))?;
     let views = (recording.batch.size_px, recording.batch.cameras.len() as u32);
     let targets = recording.batch.targets.take().map_or_else(|| drawing.targets(gpu, views), Ok)?;
-    let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
-    let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
-    let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
-    let kind = WorkKind::new(family(), &format!("{:?}", mesh.cut));
-    for (samples, depth) in targets.samples.each.iter().zip(&targets.depth.each) {
-        for (number, images) in slices(gpu, mesh).enumerate() {
-            let clear = (number == 0).then_some(wgpu::Color::TRANSPARENT);
-            quads.announce(&mut recording.frame, &[&bound]);
-            let mut pass = recording.frame.begin_drawing("quads", &[samples], clear, depth);
-            pass.set_pipeline(quads.pipeline());
-            for (image, offset) in images.iter().zip(&mut offsets) {
-                pass.set_bind_group(0, &*bound, &[offset]);
-                pass.set_vertex_buffer(0, image.inverse_depths.slice(..));
-                pass.set_index_buffer(image.indices.slice(..), wgpu::IndexFormat::Uint32);
-                pass.draw_indexed_indirect(&image.draw, 0);
-            }
-            drop(pass);
-            recording.frame.cut(kind, images.iter().map(vertices).sum());
-        }
-    }
+    let cameras = &recording.batch.cameras;
+    drawing.draw(
+        &mut recording.frame,
+        recording.set,
+        mesh,
+        cameras,
+        Some(&targets.samples.each),
+        &targets.depth.each,
+    )?;
     recording.batch.targets = Some(targets);
     Ok(())
 }
@@ -117,10 +166,9 @@ fn slices<'m>(gpu: &Gpu, mesh: &'m Mesh) -> impl Iterator<Item = &'m [ImageQuads
 }
 
 /// A uniform for each view and image.
-fn quad_works(recording: &Recording<'_>) -> Vec<u8> {
-    let set = recording.set;
+fn quad_works(set: &SampleSet, cameras: &[PinholeCamera]) -> Vec<u8> {
     let mut works = Vec::new();
-    for view in &recording.batch.cameras {
+    for view in cameras {
         for (image, sample_camera) in set.meshes.cameras.iter().zip(&set.cameras) {
             works.push(quad_work(view, image, sample_camera.first_cell));
         }

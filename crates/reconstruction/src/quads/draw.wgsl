@@ -19,8 +19,8 @@ struct QuadWork {
 
 struct Vertex {
     @builtin(position) position: vec4f,
-    @location(0) @interpolate(flat) sample: u32,
-}
+{% if not depth_only %}    @location(0) @interpolate(flat) sample: u32,
+{% endif %}}
 
 @vertex
 fn vertex(@builtin(vertex_index) number: u32, @location(0) inverse_depth: f32) -> Vertex {
@@ -34,10 +34,12 @@ fn vertex(@builtin(vertex_index) number: u32, @location(0) inverse_depth: f32) -
     let at = vec2f(vec2u(sample % work.width_px, sample / work.width_px)) + offset;
     let position = work.clip_from_inverse_depth * inverse_depth
         + work.clip_from_column * at.x + work.clip_from_row * at.y + work.clip_from_corner;
-    return Vertex(position, work.first_sample + sample);
+    return Vertex(position{{ "" if depth_only else ", work.first_sample + sample" }});
 }
 
+{% if not depth_only %}
 @fragment
 fn fragment(vertex: Vertex) -> @location(0) u32 {
     return vertex.sample;
 }
+{% endif %}

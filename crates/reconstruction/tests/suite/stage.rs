@@ -10,7 +10,7 @@ use gpu::{DevicePreference, Gpu, Turn};
 use reconstruction::{
     ReconstructRequest, ReconstructionError, ReconstructionMethod, Reconstructor, SampleSet, SetDescription,
 };
-use render::{DrawWork, Evidence, GpuScene, Lighting, RedundancyTest, Refinement, Renderer, SamplePlanes, Visibility};
+use render::{DrawWork, Evidence, GpuScene, Lighting, RedundancyTest, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
 pub const SAMPLE_PX: UVec2 = UVec2::new(96, 72);
@@ -245,14 +245,7 @@ pub fn assert_sane(view: &View, what: &str) {
 }
 
 pub fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
-    DrawWork {
-        scene,
-        lighting: Lighting::default(),
-        scene_time_s: 0.0,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    }
+    DrawWork { visibility: Visibility::Triangles, ..DrawWork::new(scene, Lighting::default()) }
 }
 
 /// A scene whose surfaces are found by rays, under a lighting.

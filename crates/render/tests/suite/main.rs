@@ -6,6 +6,7 @@ mod closed_forms;
 mod environment_map;
 mod glossy;
 mod indirect;
+mod lamp_grid;
 mod layered;
 mod light_cache;
 mod light_failures;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use depth_image::{Camera, CameraError, DepthImage, Environment, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5};
 use fixtures::{poles, quad, unit_cube, uv_sphere};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
-use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility, scalar};
+use render::{DrawWork, GpuScene, Lighting, RenderError, SamplePlanes, Visibility, scalar};
 use scene::procedural::courtyard;
 use scene::{Instance, Material, Scene, Texture, Wind};
 
@@ -15,14 +15,7 @@ const SIZE_PX: UVec2 = UVec2::new(64, 48);
 const COLOR: [u8; 3] = [200, 120, 60];
 
 fn work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32) -> DrawWork<'_> {
-    DrawWork {
-        scene,
-        lighting,
-        scene_time_s,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    }
+    DrawWork { scene_time_s, visibility: Visibility::Triangles, ..DrawWork::new(scene, lighting) }
 }
 
 fn sample_at(scene: &Scene, camera: &PinholeCamera, planes: SamplePlanes, scene_time_s: f32) -> DepthImage {

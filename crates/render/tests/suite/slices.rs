@@ -51,7 +51,7 @@ impl Shared {
         let lighting = lighting.parse().expect(lighting);
         let scene_time_s = 0.0;
         let refinement = Refinement::default();
-        DrawWork { scene: &self.scene, lighting, scene_time_s, visibility, refinement, turn: Default::default() }
+        DrawWork { scene_time_s, visibility, refinement, ..DrawWork::new(&self.scene, lighting) }
     }
 
     /// Pictures, and the slices that they took.

@@ -6,7 +6,7 @@ use depth_image::{Antialias, Camera, DepthImage, Environment, Illumination, Ligh
 use fixtures::quad;
 use glam::{Affine3A, UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
-use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, Renderer, SamplePlanes, Visibility};
 use scene::{Instance, Scene};
 
 pub const SIZE_PX: UVec2 = UVec2::new(96, 72);
@@ -44,14 +44,7 @@ pub fn upload(scene: &Scene) -> GpuScene {
 }
 
 pub fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
-    DrawWork {
-        scene,
-        lighting: lighting.parse().expect(lighting),
-        scene_time_s: 0.0,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    }
+    DrawWork { visibility: Visibility::Triangles, ..DrawWork::new(scene, lighting.parse().expect(lighting)) }
 }
 
 pub fn image(work: DrawWork<'_>, camera: &PinholeCamera) -> DepthImage {

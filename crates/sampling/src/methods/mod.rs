@@ -98,6 +98,9 @@ impl SamplingMethod {
     /// images know need to be lit in one of them alone.
     pub const OF_INDIRECT_LIGHT: Self = NonRedundant(Redundancy::Coverage);
 
+    /// The method of images from lamps where none is named: what one lamp's corner hides others show.
+    pub const OF_LAMPS: Self = NonRedundant(Redundancy::Pixel);
+
     /// The method where none is named.
     #[must_use]
     pub fn suited_to(lighting: Lighting) -> Self {

@@ -3,7 +3,7 @@
 use depth_image::{Antialias, Camera, DepthImage, PinholeCamera};
 use fixtures::{blocks, poles};
 use glam::{UVec2, Vec3};
-use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, Lighting, SamplePlanes, Visibility};
 use sampling::{Redundancy, Rig, SampleWork, SamplingError, SamplingMethod, scalar};
 use scene::Scene;
 use scene::procedural::courtyard;
@@ -30,14 +30,7 @@ fn taken(
     method: SamplingMethod,
     visibility: Visibility,
 ) -> Result<Vec<DepthImage>, SamplingError> {
-    let draw = DrawWork {
-        scene,
-        lighting: Lighting::default(),
-        scene_time_s: 0.0,
-        visibility,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    };
+    let draw = DrawWork { visibility, ..DrawWork::new(scene, Lighting::default()) };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
     device().sampler.sample(&SampleWork {
@@ -225,14 +218,7 @@ fn independent_images_can_be_taken_one_by_one() {
     let cameras = two_plane(&scene);
     let method = SamplingMethod::NonRedundant(Redundancy::Visibility);
     let whole = sample(&on_device, &cameras, method);
-    let draw = DrawWork {
-        scene: &on_device,
-        lighting: Lighting::default(),
-        scene_time_s: 0.0,
-        visibility: Visibility::Measured,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    };
+    let draw = DrawWork::new(&on_device, Lighting::default());
     let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
     let part = |wanted: &[u32], method| {
         device().sampler.sample(&SampleWork { draw, cameras: &cameras, tile_count: 1, wanted, method, planes: ALL })

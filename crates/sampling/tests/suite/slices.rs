@@ -6,7 +6,7 @@ use depth_image::PinholeCamera;
 use fixtures::poles;
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
-use render::{DrawWork, GpuScene, Refinement, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
 use sampling::{SampleWork, Sampler, SamplingMethod};
 
 use crate::stage::pinholes;
@@ -28,14 +28,8 @@ fn a_set_in_slices_is_the_whole_set_with_every_method() {
         for method in SamplingMethod::all().filter(is_possible) {
             let cameras = pinholes(&method.cameras(rig.to_vec()));
             let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-            let draw = DrawWork {
-                scene: &scene,
-                lighting: "soft 2, occlusion 2".parse().expect("a lighting"),
-                scene_time_s: 0.0,
-                visibility,
-                refinement: Refinement::default(),
-                turn: Default::default(),
-            };
+            let draw =
+                DrawWork { visibility, ..DrawWork::new(&scene, "soft 2, occlusion 2".parse().expect("a lighting")) };
             let planes = SamplePlanes { normal: true, specular: true, corners: true, ..SamplePlanes::default() };
             let work = SampleWork { draw, cameras: &cameras, tile_count: 1, wanted: &wanted, method, planes };
             let whole = sampler.sample(&work).expect("images");

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use depth_image::{Camera, PinholeCamera};
 use gpu::{DevicePreference, Gpu};
-use render::{DrawWork, GpuScene, Lighting, Refinement, Visibility};
+use render::{DrawWork, GpuScene, Lighting};
 use sampling::Sampler;
 use scene::Scene;
 
@@ -28,14 +28,7 @@ pub fn upload(scene: &Scene) -> GpuScene {
 }
 
 pub fn unlit(scene: &GpuScene) -> DrawWork<'_> {
-    DrawWork {
-        scene,
-        lighting: Lighting::UNLIT,
-        scene_time_s: 0.0,
-        visibility: Visibility::Measured,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    }
+    DrawWork::new(scene, Lighting::UNLIT)
 }
 
 pub fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {

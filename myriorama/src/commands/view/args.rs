@@ -70,6 +70,9 @@ pub struct ViewArgs {
     /// pixels that show a surface and over the whole picture; also in comparison.csv
     #[arg(long)]
     pub(super) compare: bool,
+    /// How the directly drawn pictures of --compare are lit [default: as the views]
+    #[arg(long, value_name = "TERMS", requires = "compare")]
+    pub(super) compare_lighting: Option<Lighting>,
     /// The codec of frames: lz4 or png (lossless), or jpeg:QUALITY
     #[arg(long, default_value = "lz4", value_name = "NAME")]
     pub(super) codec: FrameCodec,

@@ -34,8 +34,15 @@ pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::R
     // Depth tells where a surface is.
     let planes = ViewPlanes { inverse_depth: true, ..job.request.planes };
     let budget = BudgetRequest::default();
-    let direct =
-        SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, planes, budget, ..job.request.clone() };
+    let lighting = args.compare_lighting.map_or_else(|| job.request.lighting.clone(), |lighting| lighting.to_string());
+    let direct = SessionRequest {
+        method: DIRECT.to_owned(),
+        policy: PolicyChoice::Auto,
+        lighting,
+        planes,
+        budget,
+        ..job.request.clone()
+    };
     let session = open(&job.client, direct).await?;
     let mut rows = Vec::with_capacity(views as usize);
     let received = async |frame: Frame| {

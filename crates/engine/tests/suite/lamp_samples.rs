@@ -1,0 +1,84 @@
+//! Light of a grid on a rectangle, asked of samples of what the rectangle sees.
+
+use depth_image::{Illumination, Light, PinholeCamera, View, ViewPlanes};
+use engine::{GpuEngine, LampSampling};
+use glam::{UVec2, Vec3};
+use node::{DirectWork, Engine, EngineError, Turn, WorkClass};
+use scene::Scene;
+
+use crate::stage::engine;
+
+const HASH: &str = "blocks under a rectangle";
+
+/// Blocks under a square lamp.
+fn scene() -> Scene {
+    let scene = fixtures::blocks();
+    let bounds = scene.bounds();
+    let diagonal_m = bounds.size().length();
+    let lamp = Light::Rectangle {
+        center_in_world: bounds.center() + Vec3::Y * diagonal_m,
+        half_edges_in_world: [Vec3::X * 0.3 * diagonal_m, Vec3::Z * 0.3 * diagonal_m],
+        radiance_linear: Vec3::splat(3.0),
+    };
+    Scene { illumination: Illumination { lights: vec![lamp], ..Illumination::default() }, ..scene }
+}
+
+fn camera(scene: &Scene) -> PinholeCamera {
+    let bounds = scene.bounds();
+    let eye = bounds.center() + bounds.size() * Vec3::new(0.5, 1.2, 0.9);
+    PinholeCamera::looking_at(eye, bounds.center(), Vec3::Y, 0.8, UVec2::new(96, 72))
+}
+
+fn drawn(engine: &GpuEngine, hash: &str, camera: PinholeCamera, lighting: &str) -> Result<View, EngineError> {
+    let work = DirectWork {
+        scene_hash: hash.to_owned(),
+        cameras: vec![camera],
+        lighting: lighting.to_owned(),
+        scene_time_s: 0.0,
+        planes: ViewPlanes::WITH_DEPTH,
+        surfaces_by_rays: Some(true),
+    };
+    engine.draw_direct(&work, Turn::of(WorkClass::Batch)).map(|mut views| views.remove(0))
+}
+
+fn differing_share(a: &View, b: &View) -> f64 {
+    let differ = a.srgb8.iter().zip(&b.srgb8).filter(|(a, b)| a.abs_diff(**b) > 12).count();
+    differ as f64 / a.srgb8.len() as f64
+}
+
+#[test]
+fn samples_of_a_lamp_cast_nearly_the_shadows_of_the_scene() {
+    let scene = scene();
+    engine().put_scene(HASH, &scene).expect("a scene");
+    let camera = camera(&scene);
+    let view = |lighting: &str| drawn(engine(), HASH, camera, lighting).expect(lighting);
+    let rays = view("soft 8x8");
+    let unshadowed = view("phong");
+    assert!(differing_share(&rays, &unshadowed) > 0.1, "there are shadows");
+    assert!(differing_share(&rays, &view("soft 8x8 by maps")) < 0.03);
+    let mut before = None;
+    for sampling in [
+        "non_redundant:pixel 1024 hybrid_mesh:0.5",
+        "non_redundant:visibility 512 hybrid_mesh",
+        "conventional 1024 mesh",
+        "depth_peeling:4 512 hybrid_mesh",
+    ] {
+        engine().set_lamp_sampling(sampling.parse().expect(sampling));
+        let by_samples = view("soft 8x8 by samples");
+        let share = differing_share(&rays, &by_samples);
+        assert!(share < 0.06, "{sampling}: {share}");
+        assert!(by_samples == view("soft 8x8 by samples"), "{sampling}: the second view has the same samples");
+        assert!(before.replace(by_samples.clone()) != Some(by_samples), "{sampling}: samples of its own");
+    }
+    engine().set_lamp_sampling(LampSampling::default());
+}
+
+#[test]
+fn a_scene_without_a_rectangle_is_refused_with_the_reason() {
+    let scene = fixtures::blocks();
+    engine().put_scene("blocks without a rectangle", &scene).expect("a scene");
+    let refused = drawn(engine(), "blocks without a rectangle", camera(&scene), "soft 4x4 by samples");
+    let Err(EngineError::InvalidArgument { field, reason }) = refused else { panic!("it is drawn") };
+    assert_eq!(field, "lighting");
+    assert!(reason.contains("rectangle light"), "{reason}");
+}

@@ -1,0 +1,242 @@
+//! Which places of a grid on each lamp each pixel's surface sees: `lamp_bits.wgsl`.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{LampRig, PinholeCamera};
+use glam::{Vec2, Vec3};
+use gpu::{Binding, BufferPool, PooledBuffer, ShaderVariant, switches};
+use minijinja::{Value, context, value::merge_maps};
+use wgpu::BufferUsages;
+
+use crate::batch::{Batch, Recording};
+use crate::lamp_maps::{self, MAPS_AT_ONCE, MapLayers, MapPool};
+use crate::lighting::GridAnswer;
+use crate::rays::Traversal;
+use crate::{RenderError, raster::Raster, surfaces::Surfaces};
+
+/// Rays that one dispatch traces for a pixel.
+const RAYS_AT_ONCE: u32 = 32;
+/// The stride of a grid's rays is near this share of their number: the golden section.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LampBits {
+    by_rays: bool,
+    single_pole: bool,
+    /// Shadow maps are asked first.
+    pub maps: bool,
+    environment_map: bool,
+    light_count: usize,
+    traversal: Traversal,
+}
+
+/// `LampPoint` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuLampPoint {
+    pub eye_in_world: [f32; 3],
+    pub near_m: f32,
+    pub principal_px: [f32; 2],
+    pub padding: [f32; 2],
+}
+
+/// `LampMaps` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuLampMaps {
+    pub right_in_world: [f32; 3],
+    pub side_px: f32,
+    pub down_in_world: [f32; 3],
+    pub focal_x_px: f32,
+    pub forward_in_world: [f32; 3],
+    pub focal_y_px: f32,
+    pub points: [GpuLampPoint; MAPS_AT_ONCE as usize],
+}
+
+impl ShaderVariant for LampBits {
+    const TEMPLATE: &'static str = "lamp_bits.wgsl";
+
+    fn context(&self) -> Value {
+        let Self { by_rays, single_pole, maps, environment_map, light_count, traversal } = *self;
+        let own = context! { light_slots => gpu::light_slots(light_count), by_rays, single_pole, maps, environment_map, bits => true, writes_bits => true, primary => false, from_eye => false };
+        merge_maps([own, traversal.context()])
+    }
+
+    fn all() -> Vec<Self> {
+        let all = switches().flat_map(|[by_rays, maps, environment_map]| {
+            let plain = Self {
+                by_rays,
+                single_pole: false,
+                maps,
+                environment_map,
+                light_count: 1,
+                traversal: Traversal::ALL[0],
+            };
+            Traversal::ALL.map(|traversal| Self { traversal, ..plain })
+        });
+        all.collect()
+    }
+}
+
+/// Words of the bits of a pixel.
+pub(crate) fn words_a_pixel(side: u32, light_count: usize) -> usize {
+    (side * side).div_ceil(32) as usize * light_count
+}
+
+/// Memory for the bits of a batch; `None` for light without a grid that is asked of maps, unless bits are wanted themselves.
+pub(crate) fn lend(pool: &BufferPool, batch: &Batch<'_>) -> Option<PooledBuffer> {
+    let work = batch.work;
+    let is_used = work.lighting.grid_maps().is_some() || batch.output.lamp_bits;
+    let bytes = batch.bytes(batch.lamp_words());
+    (is_used && bytes > 0).then(|| pool.lend_storage("which places of lamps pixels see", bytes))
+}
+
+/// How far the rays of a grid are apart among its places: a whole number without a common divisor with their number.
+pub(crate) fn grid_stride(side: u32) -> u32 {
+    let count = side * side;
+    let first = (f64::from(count) * GOLDEN) as u32;
+    (first..).find(|&stride| common_divisor(stride, count) == 1).unwrap_or(1)
+}
+
+fn common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { common_divisor(b, a % b) }
+}
+
+/// The place on a lamp of a ray of a grid, as `grid.wgsl` has it.
+#[must_use]
+pub fn grid_place(side: u32, number: u32) -> Vec2 {
+    let point = number.wrapping_mul(grid_stride(side)) % (side * side);
+    (Vec2::new((point % side) as f32, (point / side) as f32) + 0.5) / side as f32
+}
+
+/// Records the bits of all lamps for the rays of this position and step: maps of some places, and what pixels see of them.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    raster: &Raster,
+    maps: &MapPool,
+    surfaces: &[Surfaces],
+) -> Result<(), RenderError> {
+    if recording.lamp_bits.is_none() {
+        return Ok(());
+    }
+    let batch = recording.batch;
+    let work = batch.work;
+    let answer = work.lighting.grid_maps();
+    for (lamp, rig) in work.scene.lamp_rigs(work.lamp_maps.side_px).into_iter().enumerate() {
+        let rig = rig.filter(|_| answer.is_some());
+        let at_once = if rig.is_some() { MAPS_AT_ONCE } else { RAYS_AT_ONCE };
+        let rays = recording.sums.rays[0].clone();
+        for first in rays.clone().step_by(at_once as usize) {
+            let chunk = first..(first + at_once).min(rays.end);
+            match rig.zip(answer) {
+                Some((rig, answer)) => {
+                    let layers = lamp_maps::lend(recording.gpu, maps, work.lamp_maps.side_px);
+                    let cameras = cameras_of(batch, &rig, chunk.clone());
+                    match (answer, work.lamp_maps.samples) {
+                        (GridAnswer::Samples, Some(samples)) => {
+                            samples.record(&mut recording.frame, lamp, &cameras, &layers.each)?;
+                        }
+                        _ => raster.record_maps(&mut recording.frame, &work, &cameras, &layers.each)?,
+                    }
+                    let uniform = GpuLampMaps::new(&cameras);
+                    let uniform = recording.gpu.buffer_with("cameras on a lamp", &[uniform], BufferUsages::UNIFORM);
+                    ask(recording, surfaces, lamp, chunk, Some(AskedMaps { uniform: &uniform, layers: &layers }))?;
+                }
+                None => ask(recording, surfaces, lamp, chunk, None)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Maps, and the uniform of their cameras.
+struct AskedMaps<'m> {
+    uniform: &'m wgpu::Buffer,
+    layers: &'m MapLayers,
+}
+
+impl AskedMaps<'_> {
+    fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("lamp_maps", self.uniform), self.layers.binding()]
+    }
+}
+
+/// Cameras at the places of some rays of a step.
+fn cameras_of(batch: &Batch<'_>, rig: &LampRig, rays: Range<u32>) -> Vec<PinholeCamera> {
+    let side = batch.work.lighting.grid_side();
+    let first = batch.first_shadow_ray();
+    rays.map(|ray| rig.camera(grid_place(side, first + ray))).collect()
+}
+
+fn ask(
+    recording: &mut Recording<'_>,
+    surfaces: &[Surfaces],
+    lamp: usize,
+    rays: Range<u32>,
+    maps: Option<AskedMaps<'_>>,
+) -> Result<(), RenderError> {
+    let batch = recording.batch;
+    let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
+    let variant = LampBits {
+        by_rays: batch.by_rays,
+        single_pole: batch.is_single_pole(),
+        maps: maps.is_some(),
+        environment_map: batch.work.scene.environment.is_some(),
+        light_count: batch.work.scene.light_count,
+        traversal: traced.traversal,
+    };
+    let detail = rays.len();
+    let cameras = batch.uniform_of_lamp(recording.gpu, &recording.pieces, &recording.sums, lamp as u32, rays);
+    for (camera, target) in surfaces.iter().enumerate() {
+        let own = [Binding::buffer("camera", &cameras)]
+            .into_iter()
+            .chain(target.bindings())
+            .chain(maps.iter().flat_map(AskedMaps::bindings));
+        let bound = recording.bind(&variant, detail, own)?;
+        recording.dispatch(&bound, camera);
+    }
+    Ok(())
+}
+
+impl GpuLampMaps {
+    /// Of cameras of one rig.
+    fn new(cameras: &[PinholeCamera]) -> Self {
+        let Some(first) = cameras.first() else { return Self::zeroed() };
+        let mut points = [GpuLampPoint::zeroed(); MAPS_AT_ONCE as usize];
+        for (point, camera) in points.iter_mut().zip(cameras) {
+            point.eye_in_world = camera.eye_in_world.to_array();
+            point.near_m = camera.near_m;
+            point.principal_px = camera.principal_px.to_array();
+        }
+        Self {
+            right_in_world: (first.world_from_camera * Vec3::X).to_array(),
+            side_px: first.size_px.x as f32,
+            down_in_world: (first.world_from_camera * Vec3::NEG_Y).to_array(),
+            focal_x_px: first.focal_px.x,
+            forward_in_world: first.forward_in_world().to_array(),
+            focal_y_px: first.focal_px.y,
+            points,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_of_a_grid_go_to_each_place_once_and_spread_early() {
+        for side in 1..=32 {
+            let mut places: Vec<[u32; 2]> =
+                (0..side * side).map(|number| grid_place(side, number).to_array().map(f32::to_bits)).collect();
+            places.sort_unstable();
+            places.dedup();
+            assert_eq!(places.len(), (side * side) as usize, "{side}");
+        }
+        let mean: Vec2 = (0..16).map(|number| grid_place(16, number)).sum::<Vec2>() / 16.0;
+        assert!((mean - 0.5).abs().max_element() < 0.1, "{mean}");
+        let beyond = grid_place(4, 16);
+        assert_eq!(beyond, grid_place(4, 0), "numbers beyond the grid begin again");
+    }
+}
