@@ -8,13 +8,10 @@ use std::sync::Arc;
 use depth_image::{Camera, Environment, Illumination, LampRig, PinholeCamera};
 use glam::Vec2;
 use gpu::{Frame, Turn};
-use node::EngineError;
 use parking_lot::Mutex;
-use reconstruction::{DepthQuads, ReconstructionMethod, Reconstructor, SetDescription};
+use reconstruction::{DepthQuads, ReconstructionError, ReconstructionMethod, Reconstructor, SetDescription};
 use render::{DrawWork, GpuScene, GridAnswer, LampMapSource, LampMaps, Lighting, RenderError, Visibility};
-use sampling::{SampleWork, SamplingMethod};
-
-use crate::{Caught, GpuEngine, draw_work, invalid};
+use sampling::{SampleWork, Sampler, SamplingError, SamplingMethod};
 
 /// Sides of lamps' images.
 const SIDES_PX: std::ops::RangeInclusive<u32> = 64..=4096;
@@ -91,94 +88,104 @@ impl LampMapSource for Drawn<'_> {
     }
 }
 
-impl GpuEngine {
-    /// The lamps for light of a scene at a moment, whose images are made where there are none yet.
-    pub(crate) fn lamps(
-        &self,
-        scene_hash: &str,
-        scene: &GpuScene,
-        lighting: Lighting,
-        scene_time_s: f32,
-        turn: Turn,
-    ) -> Result<Lamps<'_>, EngineError> {
-        let sampling = *self.lamp_samples.sampling.lock();
-        let side_px = sampling.side_px;
-        if lighting.grid_maps() != Some(GridAnswer::Samples) {
-            return Ok(Lamps { side_px, images: None });
-        }
-        let moment = Moment { scene_hash: scene_hash.to_owned(), scene_time_s, sampling };
-        let _one = self.lamp_samples.making.lock();
-        let kept = self.lamp_samples.find(&moment);
-        let images = match kept {
-            Some(images) => images,
-            None => {
-                let images = Arc::new(self.sample_lamps(scene, &moment, turn)?);
-                self.lamp_samples.keep(moment, images.clone());
-                images
-            }
-        };
-        Ok(Lamps { side_px, images: Some(Drawn { reconstructor: &self.reconstructor, images }) })
-    }
+/// A scene at a moment, and the device's place for it.
+#[derive(Clone, Copy)]
+pub(crate) struct LampScene<'s> {
+    pub hash: &'s str,
+    pub scene: &'s GpuScene,
+    pub time_s: f32,
+    pub turn: Turn,
+}
 
-    fn sample_lamps(&self, scene: &GpuScene, moment: &Moment, turn: Turn) -> Result<LampImages, EngineError> {
-        let rigs = scene.lamp_rigs(moment.sampling.side_px);
+/// What samples lamps, and cuts their samples into quads.
+#[derive(Clone, Copy)]
+pub(crate) struct LampPipelines<'e> {
+    pub sampler: &'e Sampler,
+    pub reconstructor: &'e Reconstructor,
+}
+
+/// Why lamps have no images.
+pub(crate) enum LampError {
+    NoRectangle,
+    Sampling(SamplingError),
+    Reconstruction(ReconstructionError),
+}
+
+impl<'e> LampPipelines<'e> {
+    fn sample(self, of: LampScene<'_>, sampling: LampSampling) -> Result<LampImages, LampError> {
+        let rigs = of.scene.lamp_rigs(sampling.side_px);
         if rigs.iter().all(Option::is_none) {
-            let reason = "soft NxN by samples needs a rectangle light that shines on the scene, and there is none";
-            return Err(invalid("lighting", reason));
+            return Err(LampError::NoRectangle);
         }
-        let images = rigs.iter().map(|rig| {
-            let rig = rig.as_ref();
-            rig.map(|rig| self.sample_lamp(scene, rig, moment, turn)).transpose()
-        });
+        let images = rigs.iter().map(|rig| rig.as_ref().map(|rig| self.sample_lamp(rig, of, sampling)).transpose());
         Ok(LampImages(images.collect::<Result<_, _>>()?))
     }
 
-    fn sample_lamp(
-        &self,
-        scene: &GpuScene,
-        rig: &LampRig,
-        moment: &Moment,
-        turn: Turn,
-    ) -> Result<DepthQuads, EngineError> {
-        let LampSampling { sampling, reconstruction, .. } = moment.sampling;
+    fn sample_lamp(self, rig: &LampRig, of: LampScene<'_>, sampling: LampSampling) -> Result<DepthQuads, LampError> {
         // Layers lie behind each other as the middle sees them.
-        let cameras = match sampling.own_image_count() {
+        let cameras = match sampling.sampling.own_image_count() {
             Some(layers) => vec![rig.camera(Vec2::splat(0.5)); layers as usize],
             None => rig.corners().to_vec(),
         };
         let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let unlit = draw_work(scene, Lighting::UNLIT, moment.scene_time_s, None, turn);
+        let draw = DrawWork {
+            scene_time_s: of.time_s,
+            visibility: Visibility::Triangles,
+            turn: of.turn,
+            both_faces: true,
+            ..DrawWork::new(of.scene, Lighting::UNLIT)
+        };
+        let corners = sampling.reconstruction.needs_corners();
         let work = SampleWork {
-            draw: DrawWork { visibility: Visibility::Triangles, both_faces: true, ..unlit },
+            draw,
             cameras: &cameras,
             tile_count: 1,
             wanted: &wanted,
-            method: sampling,
-            planes: render::SamplePlanes {
-                normal: true,
-                corners: reconstruction.needs_corners(),
-                ..Default::default()
-            },
+            method: sampling.sampling,
+            planes: render::SamplePlanes { normal: true, corners, ..Default::default() },
         };
-        let images = self.catching(|| self.sampler.sample(&work))?;
+        let images = self.sampler.sample(&work).map_err(LampError::Sampling)?;
         let description = SetDescription {
-            volume: scene.bounds_in_world,
+            volume: of.scene.bounds_in_world,
             background: Environment::default(),
             illumination: &Illumination::default(),
             highlight: None,
             environment: None,
             mips: false,
         };
-        let quads = || {
-            let set = self.reconstructor.upload(&images, &description, turn)?;
-            self.reconstructor.depth_quads(Arc::new(set), reconstruction, turn)
-        };
-        self.catching(|| quads().map_err(Caught::from))
+        let set = self.reconstructor.upload(&images, &description, of.turn).map_err(LampError::Reconstruction)?;
+        let quads = self.reconstructor.depth_quads(Arc::new(set), sampling.reconstruction, of.turn);
+        quads.map_err(LampError::Reconstruction)
     }
 }
 
 impl LampSamples {
+    /// The lamps for light of a scene at a moment, whose images are made where there are none yet.
+    pub fn lamps<'e>(
+        &self,
+        pipelines: LampPipelines<'e>,
+        of: LampScene<'_>,
+        lighting: Lighting,
+    ) -> Result<Lamps<'e>, LampError> {
+        let sampling = *self.sampling.lock();
+        let side_px = sampling.side_px;
+        if lighting.grid_maps() != Some(GridAnswer::Samples) {
+            return Ok(Lamps { side_px, images: None });
+        }
+        let moment = Moment { scene_hash: of.hash.to_owned(), scene_time_s: of.time_s, sampling };
+        let _one = self.making.lock();
+        let images = match self.find(&moment) {
+            Some(images) => images,
+            None => {
+                let images = Arc::new(pipelines.sample(of, sampling)?);
+                self.keep(moment, images.clone());
+                images
+            }
+        };
+        Ok(Lamps { side_px, images: Some(Drawn { reconstructor: pipelines.reconstructor, images }) })
+    }
+
     fn find(&self, moment: &Moment) -> Option<Arc<LampImages>> {
         let mut kept = self.kept.lock();
         let at = kept.iter().position(|(of, _)| of == moment)?;
@@ -207,26 +214,32 @@ impl FromStr for LampSampling {
     type Err = UnknownLampSampling;
 
     fn from_str(text: &str) -> Result<Self, UnknownLampSampling> {
-        let unknown = |reason: String| UnknownLampSampling { text: text.to_owned(), reason };
         let [sampling, side, reconstruction] = text.split_whitespace().collect::<Vec<_>>()[..] else {
-            return Err(unknown(format!(
-                "expected a sampling method, a side and a reconstruction method, as in {:?}",
-                Self::default().to_string()
-            )));
+            return Err(unknown(
+                text,
+                format!(
+                    "expected a sampling method, a side and a reconstruction method, as in {:?}",
+                    Self::default().to_string()
+                ),
+            ));
         };
-        let sampling: SamplingMethod = sampling.parse().map_err(|error| unknown(format!("{error}")))?;
+        let sampling: SamplingMethod = sampling.parse().map_err(|error| unknown(text, format!("{error}")))?;
         if !sampling.may_hold_light() && sampling.layer_selection().is_some() {
-            return Err(unknown(format!("{sampling} takes no depth images")));
+            return Err(unknown(text, format!("{sampling} takes no depth images")));
         }
         let side_px = side.parse().ok().filter(|side| SIDES_PX.contains(side));
-        let side_px = side_px.ok_or_else(|| unknown(format!("the side {side} is not from 64 to 4096")))?;
+        let side_px = side_px.ok_or_else(|| unknown(text, format!("the side {side} is not from 64 to 4096")))?;
         let reconstruction: ReconstructionMethod =
-            reconstruction.parse().map_err(|error| unknown(format!("{error}")))?;
+            reconstruction.parse().map_err(|error| unknown(text, format!("{error}")))?;
         if !reconstruction.draws_quads() {
-            return Err(unknown(format!("{reconstruction} draws no quads; mesh and hybrid_mesh do")));
+            return Err(unknown(text, format!("{reconstruction} draws no quads, of which shadow maps are made")));
         }
         Ok(Self { sampling, side_px, reconstruction })
     }
+}
+
+fn unknown(text: &str, reason: String) -> UnknownLampSampling {
+    UnknownLampSampling { text: text.to_owned(), reason }
 }
 
 impl fmt::Display for LampSampling {

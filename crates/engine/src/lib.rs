@@ -12,7 +12,7 @@ use depth_image::{
     SampleImages, View, ViewPlanes,
 };
 use gpu::{DevicePreference, Gpu, GpuError};
-use lamp_samples::LampSamples;
+use lamp_samples::{LampError, LampPipelines, LampSamples, LampScene, Lamps};
 use node::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
     UploadedSet, ViewWork, own_time,
@@ -161,13 +161,19 @@ impl GpuEngine {
         *self.lamp_samples.sampling.lock() = sampling;
     }
 
+    /// The lamps for a light: those of others than by samples have no images.
+    fn lamps(&self, of: LampScene<'_>, lighting: Lighting) -> Result<Lamps<'_>, EngineError> {
+        let pipelines = LampPipelines { sampler: &self.sampler, reconstructor: &self.reconstructor };
+        self.catching(|| self.lamp_samples.lamps(pipelines, of, lighting))
+    }
+
     /// Which places of the grid on each lamp the surface of each pixel sees, as [`Renderer::draw_lamp_bits`].
     ///
     /// # Errors
     /// The scene was never loaded, has no lamps for this light, or the device.
     pub fn lamp_bits(&self, hash: &str, lighting: Lighting, camera: &PinholeCamera) -> Result<Vec<u32>, EngineError> {
         let scene = self.scene(hash)?;
-        let lamps = self.lamps(hash, &scene, lighting, 0.0, Turn::default())?;
+        let lamps = self.lamps(LampScene { hash, scene: &scene, time_s: 0.0, turn: Turn::default() }, lighting)?;
         let draw = draw_work(&scene, lighting, 0.0, Some(true), Turn::default());
         self.catching(|| self.renderer.draw_lamp_bits(DrawWork { lamp_maps: lamps.maps(), ..draw }, camera))
     }
@@ -261,7 +267,8 @@ impl GpuEngine {
         let UploadedLight { cache, scene_hash, lighting, scene_time_s, .. } = light;
         let scene = self.scene(scene_hash)?;
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
-        let lamps = self.lamps(scene_hash, &scene, *lighting, *scene_time_s, turn)?;
+        let of = LampScene { hash: scene_hash, scene: &scene, time_s: *scene_time_s, turn };
+        let lamps = self.lamps(of, *lighting)?;
         let draw = draw_work(&scene, *lighting, *scene_time_s, light.by_rays(pixels), turn);
         let draw = DrawWork { lamp_maps: lamps.maps(), ..draw };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
@@ -341,7 +348,8 @@ impl Engine for GpuEngine {
         let mirrored: Lighting = parsed("lighting", &request.lighting)?;
         // What mirrors show is each view's own.
         let lighting = mirrored.without_reflections().unwrap_or(mirrored);
-        let lamps = self.lamps(&request.scene_hash, &scene, lighting, request.scene_time_s, turn)?;
+        let of = LampScene { hash: &request.scene_hash, scene: &scene, time_s: request.scene_time_s, turn };
+        let lamps = self.lamps(of, lighting)?;
         let draw = DrawWork {
             refinement: request.refinement,
             lamp_maps: lamps.maps(),
@@ -467,7 +475,8 @@ impl Engine for GpuEngine {
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
         let lighting: Lighting = parsed("lighting", &work.lighting)?;
-        let lamps = self.lamps(&work.scene_hash, &scene, lighting, work.scene_time_s, turn)?;
+        let of = LampScene { hash: &work.scene_hash, scene: &scene, time_s: work.scene_time_s, turn };
+        let lamps = self.lamps(of, lighting)?;
         let draw = draw_work(&scene, lighting, work.scene_time_s, work.surfaces_by_rays, turn);
         let draw = DrawWork { lamp_maps: lamps.maps(), ..draw };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
@@ -543,6 +552,17 @@ impl From<ReconstructionError> for Caught {
             | Error::LightField { .. } => "sample_images",
         };
         Self(invalid(field, error))
+    }
+}
+
+impl From<LampError> for Caught {
+    fn from(error: LampError) -> Self {
+        let reason = "soft NxN by samples needs a rectangle light that shines on the scene, and there is none";
+        match error {
+            LampError::NoRectangle => Self(invalid("lighting", reason)),
+            LampError::Sampling(error) => error.into(),
+            LampError::Reconstruction(error) => error.into(),
+        }
     }
 }
 

@@ -293,7 +293,7 @@ impl Reconstructor {
         turn: Turn,
     ) -> Result<DepthQuads, ReconstructionError> {
         check_samples(&set, method)?;
-        let needed = "a method that draws quads: mesh or hybrid_mesh";
+        let needed = "a method that draws quads";
         let mesh = method.mesh(&self.device, &set, turn)?;
         let mesh = mesh.ok_or_else(|| ReconstructionError::NoSamples { what: method.to_string(), needed })?;
         Ok(DepthQuads { set, mesh })

@@ -13,8 +13,8 @@ use crate::accumulation::Sums;
 use crate::pixel_camera::{PixelCamera, uniform};
 use crate::{RenderError, rays::Traced, work::DrawWork};
 use crate::{
+    grid::{grid_stride, words_a_pixel},
     known_samples::ImageSequence,
-    lamp_bits::{grid_stride, words_a_pixel},
     light_samples::{CachedLight, CoveredBy},
     pieces::Piece,
     planes::Output,

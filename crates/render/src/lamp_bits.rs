@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{LampRig, PinholeCamera};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use gpu::{Binding, BufferPool, PooledBuffer, ShaderVariant, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::BufferUsages;
 
 use crate::batch::{Batch, Recording};
+use crate::grid::grid_place;
 use crate::lamp_maps::{self, MAPS_AT_ONCE, MapLayers, MapPool};
 use crate::lighting::GridAnswer;
 use crate::rays::Traversal;
@@ -17,9 +18,6 @@ use crate::{RenderError, raster::Raster, surfaces::Surfaces};
 
 /// Rays that one dispatch traces for a pixel.
 const RAYS_AT_ONCE: u32 = 32;
-/// The stride of a grid's rays is near this share of their number: the golden section.
-const GOLDEN: f64 = 0.618_033_988_749_895;
-
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LampBits {
     by_rays: bool,
@@ -79,35 +77,12 @@ impl ShaderVariant for LampBits {
     }
 }
 
-/// Words of the bits of a pixel.
-pub(crate) fn words_a_pixel(side: u32, light_count: usize) -> usize {
-    (side * side).div_ceil(32) as usize * light_count
-}
-
 /// Memory for the bits of a batch; `None` for light without a grid that is asked of maps, unless bits are wanted themselves.
 pub(crate) fn lend(pool: &BufferPool, batch: &Batch<'_>) -> Option<PooledBuffer> {
     let work = batch.work;
     let is_used = work.lighting.grid_maps().is_some() || batch.output.lamp_bits;
     let bytes = batch.bytes(batch.lamp_words());
     (is_used && bytes > 0).then(|| pool.lend_storage("which places of lamps pixels see", bytes))
-}
-
-/// How far the rays of a grid are apart among its places: a whole number without a common divisor with their number.
-pub(crate) fn grid_stride(side: u32) -> u32 {
-    let count = side * side;
-    let first = (f64::from(count) * GOLDEN) as u32;
-    (first..).find(|&stride| common_divisor(stride, count) == 1).unwrap_or(1)
-}
-
-fn common_divisor(a: u32, b: u32) -> u32 {
-    if b == 0 { a } else { common_divisor(b, a % b) }
-}
-
-/// The place on a lamp of a ray of a grid, as `grid.wgsl` has it.
-#[must_use]
-pub fn grid_place(side: u32, number: u32) -> Vec2 {
-    let point = number.wrapping_mul(grid_stride(side)) % (side * side);
-    (Vec2::new((point % side) as f32, (point / side) as f32) + 0.5) / side as f32
 }
 
 /// Records the bits of all lamps for the rays of this position and step: maps of some places, and what pixels see of them.
@@ -218,25 +193,5 @@ impl GpuLampMaps {
             focal_y_px: first.focal_px.y,
             points,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rays_of_a_grid_go_to_each_place_once_and_spread_early() {
-        for side in 1..=32 {
-            let mut places: Vec<[u32; 2]> =
-                (0..side * side).map(|number| grid_place(side, number).to_array().map(f32::to_bits)).collect();
-            places.sort_unstable();
-            places.dedup();
-            assert_eq!(places.len(), (side * side) as usize, "{side}");
-        }
-        let mean: Vec2 = (0..16).map(|number| grid_place(16, number)).sum::<Vec2>() / 16.0;
-        assert!((mean - 0.5).abs().max_element() < 0.1, "{mean}");
-        let beyond = grid_place(4, 16);
-        assert_eq!(beyond, grid_place(4, 0), "numbers beyond the grid begin again");
     }
 }

@@ -66,21 +66,22 @@ impl MapLayers {
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
         let size = [side_px, side_px, MAPS_AT_ONCE];
         let texture = gpu.texture("shadow maps", size, DrawPass::DEPTH_FORMAT, usage);
-        let view = |dimension, base_array_layer, count| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(dimension),
-                base_array_layer,
-                array_layer_count: Some(count),
-                ..Default::default()
-            })
-        };
         Self {
-            all: view(TextureViewDimension::D2Array, 0, MAPS_AT_ONCE),
-            each: (0..MAPS_AT_ONCE).map(|layer| view(TextureViewDimension::D2, layer, 1)).collect(),
+            all: view_of(&texture, TextureViewDimension::D2Array, 0, MAPS_AT_ONCE),
+            each: (0..MAPS_AT_ONCE).map(|layer| view_of(&texture, TextureViewDimension::D2, layer, 1)).collect(),
         }
     }
 
     pub fn binding(&self) -> Binding<'_> {
         Binding::texture("maps", &self.all)
     }
+}
+
+fn view_of(texture: &wgpu::Texture, dimension: TextureViewDimension, base_array_layer: u32, count: u32) -> TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(dimension),
+        base_array_layer,
+        array_layer_count: Some(count),
+        ..Default::default()
+    })
 }

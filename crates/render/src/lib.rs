@@ -14,6 +14,7 @@ mod error;
 mod few_cores;
 mod finish;
 mod gpu_scene;
+mod grid;
 mod illuminate;
 mod keep;
 mod known_samples;

@@ -11,8 +11,8 @@ use gpu::{Gpu, GpuError, Pool, TablePool, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
+use crate::grid::words_a_pixel;
 use crate::known_samples::{ImageSequence, KnownSamples};
-use crate::lamp_bits::words_a_pixel;
 use crate::layered;
 use crate::light_samples::{CachedLight, CoveredBy, LightCache, LookUpTests};
 use crate::planes::{self, Output};

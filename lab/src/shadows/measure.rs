@@ -2,6 +2,7 @@
 
 use depth_image::View;
 use engine::{GpuEngine, LampSampling};
+use report::Point;
 use sampling::SamplingMethod;
 
 use super::errors::ShadowErrors;
@@ -149,6 +150,12 @@ pub struct TimeRow {
     pub maps_s: f64,
 }
 
+impl TimeRow {
+    pub fn point(&self) -> Point {
+        (self.triangles as f64, self.images_s + self.maps_s).into()
+    }
+}
+
 /// The times of a few maps of the scene, and of samples.
 ///
 /// # Errors
@@ -174,6 +181,12 @@ pub struct FrontRow {
     pub seconds: f64,
     /// Mean difference of colours, of 255, from rays to 32×32 places, where a surface is shown.
     pub error: f64,
+}
+
+impl FrontRow {
+    pub fn point(&self) -> Point {
+        (self.seconds, self.error.max(1e-3)).into()
+    }
 }
 
 /// Error against time: numbers of rays, maps and samples.

@@ -77,8 +77,7 @@ pub fn report(measured: &Measured, report: &mut Report) -> anyhow::Result<()> {
             Axis::log("a view", "s"),
             Axis::log("mean difference from rays to 32×32 places", "of 255"),
         );
-        let points = |row: &FrontRow| (row.seconds, row.error.max(1e-3)).into();
-        report.charts.push(with_series(chart, rows, Mark::Line, |row| row.answer.to_owned(), points));
+        report.charts.push(with_series(chart, rows, Mark::Line, |row| row.answer.to_owned(), FrontRow::point));
     }
     report.checks.extend(checks(measured));
     report.summary = fronts_summary(measured);
@@ -113,23 +112,24 @@ fn paper_table(
     let mut table = Table::new(name, &columns);
     for row in paper {
         let own = ours(row);
-        let of = |sampling: usize| -> Cell {
-            let own = own.iter().find(|row| row.sampling == SAMPLINGS[sampling]).map(|row| row.against_maps);
-            own.map_or_else(|| "–".into(), |errors| pair([errors.intensity, errors.visibility]).into())
-        };
         table.push([
             row.scene.into(),
             row.at.into(),
             pair(row.conventional).into(),
-            of(0),
+            errors_cell(&own, SAMPLINGS[0]),
             pair(row.non_redundant).into(),
-            of(1),
-            of(2),
+            errors_cell(&own, SAMPLINGS[1]),
+            errors_cell(&own, SAMPLINGS[2]),
             pair(row.peeled).into(),
-            of(3),
+            errors_cell(&own, SAMPLINGS[3]),
         ])?;
     }
     Ok(table)
+}
+
+fn errors_cell(rows: &[ShadowRow], sampling: &str) -> Cell {
+    let row = rows.iter().find(|row| row.sampling == sampling);
+    row.map_or_else(|| "–".into(), |row| pair([row.against_maps.intensity, row.against_maps.visibility]).into())
 }
 
 fn pair([intensity, visibility]: [f64; 2]) -> String {
@@ -169,8 +169,7 @@ fn times_table(measured: &Measured) -> anyhow::Result<Table> {
 /// Fig. 9: the time of all steps over the number of triangles.
 fn triangles_chart(measured: &Measured) -> XyChart {
     let chart = XyChart::new("Fig. 9: time of sixteen shadow maps", Axis::log("triangles", ""), Axis::log("time", "s"));
-    let point = |row: &TimeRow| (row.triangles as f64, row.images_s + row.maps_s).into();
-    with_series(chart, &measured.times, Mark::Line, |row| row.answer.to_owned(), point)
+    with_series(chart, &measured.times, Mark::Line, |row| row.answer.to_owned(), TimeRow::point)
 }
 
 fn checks(measured: &Measured) -> Vec<Check> {
@@ -206,15 +205,17 @@ fn checks(measured: &Measured) -> Vec<Check> {
         Bar::Equal(0.0),
     ));
     for (scene, most) in [("grass:36", 1.0), ("grass:144", 0.25)] {
-        let maps_s = |answer: &str| {
-            let row = measured.times.iter().find(|row| row.scene == scene && row.answer == answer);
-            row.map(|row| row.maps_s)
-        };
-        let ratio = maps_s("non_redundant:pixel").zip(maps_s(OF_SCENE)).map(|(samples_s, scene_s)| samples_s / scene_s);
+        let samples_s = maps_s(measured, scene, "non_redundant:pixel");
+        let scene_s = maps_s(measured, scene, OF_SCENE);
+        let ratio = samples_s.zip(scene_s).map(|(samples_s, scene_s)| samples_s / scene_s);
         let name = format!("time of maps from samples over maps of the scene, {scene}");
         checks.push(check_if_measured(name, ratio, "×", Bar::AtMost(most), NOT_MEASURED));
     }
     checks
+}
+
+fn maps_s(measured: &Measured, scene: &str, answer: &str) -> Option<f64> {
+    measured.times.iter().find(|row| row.scene == scene && row.answer == answer).map(|row| row.maps_s)
 }
 
 fn non_redundant_ratio(shadows: &Shadows, setting: Setting) -> Option<f64> {

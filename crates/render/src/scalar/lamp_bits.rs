@@ -3,7 +3,7 @@
 use depth_image::{Light, PinholeCamera};
 use glam::Vec3;
 
-pub use crate::lamp_bits::grid_place;
+pub use crate::grid::grid_place;
 
 /// As the shader's constants.
 const BIAS_TEXELS: f32 = 0.5;
