@@ -11,15 +11,17 @@ pub struct Extent {
     pub seeds: usize,
     /// The number of sides of images in Fig. 7.
     pub sides: usize,
+    /// The number of views at each distance of the viewpoints.
+    pub views_a_distance: usize,
 }
 
 impl Extent {
     /// The paper's size, or a smaller one.
     pub fn of(quick: bool) -> Self {
         if quick {
-            Self { side_px: 256, views: 64, seeds: 512, sides: 2 }
+            Self { side_px: 256, views: 64, seeds: 512, sides: 2, views_a_distance: 8 }
         } else {
-            Self { side_px: 1024, views: 1000, seeds: 4096, sides: 4 }
+            Self { side_px: 1024, views: 1000, seeds: 4096, sides: 4, views_a_distance: 32 }
         }
     }
 }

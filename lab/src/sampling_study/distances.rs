@@ -1,0 +1,251 @@
+//! Samples that sets leave unavailable, conventional and by pixel, against the distance of the viewpoints.
+//!
+//! The paper does not state its distances. They are taken to be those at which conventional images are as redundant here as there.
+
+use glam::UVec2;
+use report::{Axis, Bar, Cell, Check, Limit, Report, Series, XyChart};
+
+use super::availability::Availability;
+use super::counts::{image_counts, percent};
+use super::extent::Extent;
+use super::held::ImageSurfaces;
+use super::methods::METHODS;
+use super::paper::{paper_available, paper_image};
+use super::sizes::mean_of_later;
+use super::subject::{Subject, WITH_IDS};
+use crate::statistics::mean_of;
+use crate::study::{Column, measure_rows, table};
+
+/// Distances of the viewpoints over those of the other tables. The distance that follows them is the scene's diagonal.
+const FACTORS: [f32; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+/// The side of frames of the paper's shadows. It states none for its tables; frames have the side of the images, too.
+const FRAME_PX: u32 = 512;
+/// The most that `pixel` leaves unavailable over conventional sampling, where redundancy is the paper's.
+const MOST_RATIO_AT_PAPER: f64 = 0.8;
+
+/// One distance of the viewpoints, with frames of one size.
+pub struct DistanceRow {
+    scene: String,
+    frame_px: u32,
+    /// The distance of two viewpoints, in diagonals of the scene.
+    distance: f64,
+    /// Redundant samples of conventional images 1 and 2, per cent.
+    redundant: f64,
+    /// Samples of frames that no conventional image holds, per cent.
+    conventional: f64,
+    /// Samples of frames that no image by pixel holds, per cent.
+    pixel: f64,
+}
+
+/// A scene's rows with frames of one size, beside the paper's figures.
+struct Summary {
+    scene: String,
+    frame_px: u32,
+    /// The least distance from which on `pixel` leaves fewer samples unavailable.
+    wins_from: Option<f64>,
+    paper_redundant: f64,
+    at_paper: Place,
+    paper_ratio: Option<f64>,
+}
+
+/// A place on the curve of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Place {
+    distance: f64,
+    ratio: f64,
+}
+
+const COLUMNS: [Column<DistanceRow>; 7] = [
+    Column::new("scene", |row| row.scene.as_str().into()),
+    Column::with_unit("frames", "px", |row| row.frame_px.into()),
+    Column::with_unit("distance", "diagonals", |row| row.distance.into()),
+    Column::with_unit("redundant", "%", |row| row.redundant.into()),
+    Column::with_unit("unavailable, conventional", "%", |row| row.conventional.into()),
+    Column::with_unit("unavailable, pixel", "%", |row| row.pixel.into()),
+    Column::with_unit("pixel over conventional", "×", |row| row.ratio().into()),
+];
+
+const SUMMARY: [Column<Summary>; 7] = [
+    Column::new("scene", |row| row.scene.as_str().into()),
+    Column::with_unit("frames", "px", |row| row.frame_px.into()),
+    Column::with_unit("pixel leaves fewer unavailable from", "diagonals", |row| match row.wins_from {
+        Some(distance) => distance.into(),
+        None => Cell::from("none up to the scene's size"),
+    }),
+    Column::with_unit("paper: redundant", "%", |row| row.paper_redundant.into()),
+    Column::with_unit("as redundant here at", "diagonals", |row| row.at_paper.distance.into()),
+    Column::with_unit("pixel over conventional there", "×", |row| row.at_paper.ratio.into()),
+    Column::with_unit("paper: pixel over conventional", "×", |row| row.paper_ratio.into()),
+];
+
+/// Measures a scene at all distances.
+///
+/// # Errors
+/// The device fails.
+pub fn distances(subject: &Subject, extent: Extent) -> anyhow::Result<Vec<DistanceRow>> {
+    let mut factors = FACTORS.to_vec();
+    factors.push(1.0 / subject.viewpoint_distance());
+    let name = format!("{}: distances of viewpoints", subject.name);
+    let measured = measure_rows(&name, factors, |factor| at_distance(&subject.spread_by(factor), extent))?;
+    Ok(measured.into_iter().flatten().collect())
+}
+
+/// The rows of both sizes of frames.
+fn at_distance(subject: &Subject, extent: Extent) -> anyhow::Result<Vec<DistanceRow>> {
+    let size_px = UVec2::splat(extent.side_px);
+    let methods = &METHODS[..2];
+    let sets =
+        methods.iter().map(|&method| subject.sample(method, size_px, WITH_IDS)).collect::<Result<Vec<_>, _>>()?;
+    let held: Vec<Vec<ImageSurfaces<'_>>> =
+        sets.iter().map(|set| set.iter().filter_map(ImageSurfaces::of).collect()).collect();
+    let redundant = mean_of_later(&image_counts(&sets)[0], |image| percent(image.redundant, image.samples));
+    let mut rows = Vec::new();
+    for frame_px in [FRAME_PX, extent.side_px] {
+        let mut available = [Availability::default(), Availability::default()];
+        subject.each_frame(&subject.between(extent.views_a_distance, UVec2::splat(frame_px)), |frames| {
+            for frame in frames {
+                available.iter_mut().zip(&held).for_each(|(available, set)| available.add(frame, set));
+            }
+            Ok(())
+        })?;
+        rows.push(DistanceRow {
+            scene: subject.name.clone(),
+            frame_px,
+            distance: subject.viewpoint_distance().into(),
+            redundant,
+            conventional: 100.0 - available[0].mean(),
+            pixel: 100.0 - available[1].mean(),
+        });
+    }
+    Ok(rows)
+}
+
+impl DistanceRow {
+    fn ratio(&self) -> f64 {
+        self.pixel / self.conventional
+    }
+
+    fn series(&self) -> String {
+        format!("{}, {}²", self.scene, self.frame_px)
+    }
+}
+
+impl Summary {
+    /// Summarizes the rows of one scene and one size of frames, from the shortest distance on.
+    fn new(rows: &[&DistanceRow]) -> Self {
+        let first = rows[0];
+        let [later, last] = [1, 2].map(|image| paper_image(&first.scene, METHODS[0], image).redundant);
+        let paper_redundant = (later.unwrap_or(f64::NAN) + last.unwrap_or(f64::NAN)) / 2.0;
+        let [conventional, pixel] = [0, 1].map(|method| paper_available(&first.scene, METHODS[method])[0]);
+        let paper_ratio = conventional.zip(pixel).map(|(conventional, pixel)| (100.0 - pixel) / (100.0 - conventional));
+        let losing = rows.iter().rposition(|row| row.ratio() >= 1.0);
+        let wins_from = rows.get(losing.map_or(0, |last| last + 1)).map(|row| row.distance);
+        Self {
+            scene: first.scene.clone(),
+            frame_px: first.frame_px,
+            wins_from,
+            paper_redundant,
+            at_paper: where_redundant(rows, paper_redundant),
+            paper_ratio,
+        }
+    }
+}
+
+/// The place at which conventional images are this redundant, between two rows; the nearest row's where no two rows enclose it.
+fn where_redundant(rows: &[&DistanceRow], redundant: f64) -> Place {
+    for pair in rows.windows(2) {
+        let [near, far] = [pair[0], pair[1]];
+        let share = (near.redundant - redundant) / (near.redundant - far.redundant);
+        if (0.0..=1.0).contains(&share) {
+            return Place {
+                distance: near.distance + share * (far.distance - near.distance),
+                ratio: near.ratio() + share * (far.ratio() - near.ratio()),
+            };
+        }
+    }
+    let nearest =
+        rows.iter().min_by(|a, b| (a.redundant - redundant).abs().total_cmp(&(b.redundant - redundant).abs()));
+    nearest.map_or(Place { distance: f64::NAN, ratio: f64::NAN }, |row| Place {
+        distance: row.distance,
+        ratio: row.ratio(),
+    })
+}
+
+/// Adds tables, curves and checks of all scenes.
+///
+/// # Errors
+/// A row does not fit its table.
+pub fn distances_report(rows: &[DistanceRow], report: &mut Report) -> anyhow::Result<()> {
+    let mut curves: Vec<Vec<&DistanceRow>> = Vec::new();
+    for row in rows {
+        match curves.iter_mut().find(|curve| curve[0].series() == row.series()) {
+            Some(curve) => curve.push(row),
+            None => curves.push(vec![row]),
+        }
+    }
+    let summaries: Vec<Summary> = curves.iter().map(|curve| Summary::new(curve)).collect();
+    report.tables.push(table("Distance of the viewpoints", &COLUMNS, rows)?);
+    report.tables.push(table("Distance of the viewpoints, beside the paper", &SUMMARY, &summaries)?);
+    let axis = Axis::log("distance of viewpoints", "diagonals of the scene");
+    let mut ratio =
+        XyChart::new("Unavailable samples, pixel over conventional", axis.clone(), Axis::linear("ratio", "×"));
+    ratio.limits.push(Limit { name: "as many as conventional".to_owned(), y: 1.0 });
+    let mut redundant = XyChart::new("Redundant samples of conventional images", axis, Axis::linear("redundant", "%"));
+    for curve in &curves {
+        ratio = ratio.with(Series::line(curve[0].series(), curve.iter().map(|row| (row.distance, row.ratio()))));
+        if curve[0].frame_px == FRAME_PX {
+            let points = curve.iter().map(|row| (row.distance, row.redundant));
+            redundant = redundant.with(Series::line(curve[0].scene.clone(), points));
+        }
+    }
+    report.charts.extend([ratio, redundant]);
+    let mut sides: Vec<u32> = summaries.iter().map(|summary| summary.frame_px).collect();
+    sides.sort_unstable();
+    sides.dedup();
+    for side_px in sides {
+        let of_side: Vec<&Summary> = summaries.iter().filter(|summary| summary.frame_px == side_px).collect();
+        let mean = mean_of(&of_side, |summary| summary.at_paper.ratio);
+        let name =
+            format!("frames of {side_px}²: unavailable by pixel over conventional at the paper's distances, mean");
+        report.checks.push(Check::new(name, mean, "×", Bar::AtMost(MOST_RATIO_AT_PAPER)));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(distance: f64, redundant: f64, ratio: f64) -> DistanceRow {
+        DistanceRow {
+            scene: "tree".to_owned(),
+            frame_px: FRAME_PX,
+            distance,
+            redundant,
+            conventional: 10.0,
+            pixel: 10.0 * ratio,
+        }
+    }
+
+    #[test]
+    fn the_papers_distance_lies_between_the_rows_that_enclose_its_redundancy() {
+        let rows = [row(0.25, 60.0, 1.2), row(0.5, 40.0, 1.0), row(1.0, 18.0, 0.5)];
+        let summary = Summary::new(&rows.iter().collect::<Vec<_>>());
+        assert_eq!(summary.paper_redundant, 29.0);
+        assert_eq!(summary.at_paper, Place { distance: 0.75, ratio: 0.75 });
+        assert!((summary.paper_ratio.unwrap() - 41.0 / 45.0).abs() < 1e-9);
+        let nearest = where_redundant(&rows.iter().collect::<Vec<_>>(), 70.0);
+        assert_eq!(nearest, Place { distance: 0.25, ratio: 1.2 });
+    }
+
+    #[test]
+    fn pixel_wins_from_the_distance_after_which_it_never_loses() {
+        let wins_from = |ratios: [f64; 3]| {
+            let rows = [row(0.25, 60.0, ratios[0]), row(0.5, 40.0, ratios[1]), row(1.0, 18.0, ratios[2])];
+            Summary::new(&rows.iter().collect::<Vec<_>>()).wins_from
+        };
+        assert_eq!(wins_from([0.9, 1.1, 0.8]), Some(1.0));
+        assert_eq!(wins_from([0.9, 0.8, 0.8]), Some(0.25));
+        assert_eq!(wins_from([0.9, 0.8, 1.0]), None);
+    }
+}
