@@ -56,7 +56,7 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
         by_distance.extend(distances(&subject, extent)?);
     }
     tables(&rows, &mut report)?;
-    distances_report(&by_distance, &mut report)?;
+    distances_report(&by_distance, extent, &mut report)?;
     times_report(&costs, extent, &mut report)?;
     if args.scenes.is_empty() {
         shared_light::measure(&Stand::new(&engine, false), args.study.quick, args.models.as_deref(), &mut report)?;
