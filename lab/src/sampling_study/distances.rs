@@ -48,8 +48,8 @@ struct Unavailable {
 struct Summary {
     scene: String,
     frame_px: u32,
-    /// The least distance from which on `pixel` leaves fewer samples unavailable.
-    wins_from: Option<f64>,
+    /// The least and the greatest measured distance at which `pixel` leaves fewer samples unavailable.
+    wins: Option<[f64; 2]>,
     paper_redundant: f64,
     at_paper: Place,
     paper_ratio: Option<f64>,
@@ -77,8 +77,8 @@ const COLUMNS: [Column<DistanceRow>; 8] = [
 const SUMMARY: [Column<Summary>; 8] = [
     Column::new("scene", |row| row.scene.as_str().into()),
     Column::with_unit("frames", "px", |row| row.frame_px.into()),
-    Column::with_unit("pixel leaves fewer unavailable from", "diagonals", |row| match row.wins_from {
-        Some(distance) => distance.into(),
+    Column::with_unit("pixel leaves fewer unavailable from … to", "diagonals", |row| match row.wins {
+        Some([least, greatest]) => Cell::from(format!("{least:.2} to {greatest:.2}")),
         None => Cell::from("none up to the scene's size"),
     }),
     Column::with_unit("paper: redundant", "%", |row| row.paper_redundant.into()),
@@ -166,12 +166,12 @@ impl Summary {
         let paper_redundant = (later.unwrap_or(f64::NAN) + last.unwrap_or(f64::NAN)) / 2.0;
         let [conventional, pixel] = [0, 1].map(|method| paper_available(&first.scene, METHODS[method])[0]);
         let paper_ratio = conventional.zip(pixel).map(|(conventional, pixel)| (100.0 - pixel) / (100.0 - conventional));
-        let losing = rows.iter().rposition(|row| row.exact.ratio() >= 1.0);
-        let wins_from = rows.get(losing.map_or(0, |last| last + 1)).map(|row| row.distance);
+        let winning: Vec<f64> = rows.iter().filter(|row| row.exact.ratio() < 1.0).map(|row| row.distance).collect();
+        let wins = winning.first().zip(winning.last()).map(|(&least, &greatest)| [least, greatest]);
         Self {
             scene: first.scene.clone(),
             frame_px: first.frame_px,
-            wins_from,
+            wins,
             paper_redundant,
             at_paper: where_redundant(rows, paper_redundant),
             paper_ratio,
@@ -260,13 +260,13 @@ mod tests {
     }
 
     #[test]
-    fn pixel_wins_from_the_distance_after_which_it_never_loses() {
-        let wins_from = |ratios: [f64; 3]| {
+    fn pixel_wins_between_the_first_and_the_last_ratio_below_1() {
+        let wins = |ratios: [f64; 3]| {
             let rows = [row(0.25, 60.0, ratios[0]), row(0.5, 40.0, ratios[1]), row(1.0, 18.0, ratios[2])];
-            Summary::new(&rows.iter().collect::<Vec<_>>()).wins_from
+            Summary::new(&rows.iter().collect::<Vec<_>>()).wins
         };
-        assert_eq!(wins_from([0.9, 1.1, 0.8]), Some(1.0));
-        assert_eq!(wins_from([0.9, 0.8, 0.8]), Some(0.25));
-        assert_eq!(wins_from([0.9, 0.8, 1.0]), None);
+        assert_eq!(wins([1.3, 0.9, 0.8]), Some([0.5, 1.0]));
+        assert_eq!(wins([1.1, 0.8, 1.0]), Some([0.5, 0.5]));
+        assert_eq!(wins([1.2, 1.1, 1.0]), None);
     }
 }

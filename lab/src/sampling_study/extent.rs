@@ -40,7 +40,7 @@ impl Extent {
                 sides: 4,
                 distances: &[0.25, 0.5, 1.0, 2.0, 4.0],
                 distance_frames_px: &[512, 1024],
-                distance_views: 32,
+                distance_views: 8,
             }
         }
     }
