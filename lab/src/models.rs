@@ -17,6 +17,13 @@ pub(crate) fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBu
     Ok(found)
 }
 
+/// The model file of a name, without its ending, in a folder or its subfolders.
+pub(crate) fn model_named(folder: &Path, name: &str) -> anyhow::Result<PathBuf> {
+    let mut models = models_of(folder, usize::MAX)?.into_iter();
+    let model = models.find(|model| model.file_stem().is_some_and(|stem| stem == name));
+    Ok(model.ok_or_else(|| BadInput(format!("{}: no model {name}", folder.display())))?)
+}
+
 fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let listed = std::fs::read_dir(folder)
         .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>());

@@ -145,15 +145,15 @@ struct CostRow<'t> {
 
 /// Errors of views beside direct rendering, as means over whole views.
 #[derive(Debug, Clone, Copy, Default)]
-struct Errors {
-    psnr_db: f64,
-    flip: f64,
+pub(super) struct Errors {
+    pub(super) psnr_db: f64,
+    pub(super) flip: f64,
     /// Pixels that differ perceptibly.
-    different_px: f64,
+    pub(super) different_px: f64,
 }
 
 impl Errors {
-    fn new(direct: &[View], made: &[View]) -> anyhow::Result<Self> {
+    pub(super) fn new(direct: &[View], made: &[View]) -> anyhow::Result<Self> {
         let mut sums = Self::default();
         for (direct, view) in direct.iter().zip(made) {
             sums.psnr_db += psnr_db(direct, view, None)?.unwrap_or(f64::NAN);

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use anyhow::Context as _;
-use app_core::exit::BadInput;
 use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, ViewCell};
 use glam::{UVec2, Vec3};
@@ -13,7 +12,7 @@ use scene::{Scene, SceneSpec};
 
 use crate::failures::cached_light::LitScene;
 use crate::failures::stand::Stand;
-use crate::models::models_of;
+use crate::models::model_named;
 
 pub const VIEW_PX: UVec2 = UVec2::new(640, 360);
 /// Views are the first places of an orbit of so many.
@@ -72,9 +71,7 @@ impl Subject {
         let mut scene = fixtures::spec(scene_name)?;
         if let SceneSpec::File(file) = &mut scene {
             let Some(folder) = models else { return Ok(None) };
-            let mut models = models_of(folder, usize::MAX)?.into_iter();
-            let model = models.find(|model| model.file_stem().is_some_and(|stem| stem == scene_name));
-            *file = model.ok_or_else(|| BadInput(format!("{}: no model {scene_name}", folder.display())))?;
+            *file = model_named(folder, scene_name)?;
         }
         Ok(Some(Self { name, scene }))
     }

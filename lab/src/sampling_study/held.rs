@@ -1,5 +1,7 @@
 //! Surfaces that an image holds: pixel redundancy, the measure of sampling methods (Xie §6.1.2).
 
+use std::ops::Range;
+
 use depth_image::{DepthImage, SurfaceId};
 use glam::{Vec3, Vec4};
 
@@ -42,6 +44,11 @@ impl<'a> ImageSurfaces<'a> {
 
     /// True if the image has a sample of the same triangle at the pixel where the point is seen (Xie, Algorithm 3).
     pub fn has(&self, sample: &HeldSample) -> bool {
+        self.has_within(sample, 0)
+    }
+
+    /// True if the image has a sample of the same triangle at the pixel where the point is seen, or at most `reach_px` away.
+    pub fn has_within(&self, sample: &HeldSample, reach_px: usize) -> bool {
         let p = sample.point_in_world.extend(1.0);
         let [u, v, w] = self.homogeneous_pixel_from_world.map(|row| row.dot(p));
         let x = u / w;
@@ -49,9 +56,21 @@ impl<'a> ImageSurfaces<'a> {
         if !(w > self.near_m && x >= 0.0 && y >= 0.0 && x < self.columns && y < self.rows) {
             return false;
         }
-        let index = y as usize * self.columns as usize + x as usize;
-        self.inverse_depth_per_m[index] > 0.0 && self.ids[index] == sample.id
+        let columns = self.columns as usize;
+        let rows = self.rows as usize;
+        around(y, reach_px, rows).any(|y| {
+            around(x, reach_px, columns).any(|x| {
+                let index = y * columns + x;
+                self.inverse_depth_per_m[index] > 0.0 && self.ids[index] == sample.id
+            })
+        })
     }
+}
+
+/// The pixels around a place along one side of an image.
+fn around(place: f32, reach_px: usize, count: usize) -> Range<usize> {
+    let pixel = place as usize;
+    pixel.saturating_sub(reach_px)..(pixel + reach_px + 1).min(count)
 }
 
 /// All samples of an image with surface ids, row by row.
@@ -100,7 +119,11 @@ mod tests {
         let beside = HeldSample { point_in_world: Vec3::X * 9.0, ..samples[5] };
         assert!(!held.has(&other) && !held.has(&beside));
         image.inverse_depth_per_m[5] = HOLE_INVERSE_DEPTH;
-        assert!(!ImageSurfaces::of(&image).unwrap().has(&samples[5]));
+        let held = ImageSurfaces::of(&image).unwrap();
+        assert!(!held.has(&samples[5]));
+        let beside = HeldSample { id: id(6), ..samples[5] };
+        let far = HeldSample { id: id(7), ..samples[5] };
+        assert!(held.has_within(&beside, 1) && !held.has_within(&far, 1) && held.has_within(&far, 2));
         assert_eq!(held_samples(&image).len(), 191);
     }
 }

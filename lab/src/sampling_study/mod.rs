@@ -4,6 +4,7 @@ mod availability;
 pub mod command;
 mod counts;
 mod detection;
+mod distances;
 mod extent;
 mod held;
 mod methods;

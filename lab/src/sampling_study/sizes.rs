@@ -99,7 +99,7 @@ impl SizeRow {
 }
 
 /// The mean over all images but the first.
-fn mean_of_later<T>(images: &[T], value: fn(&T) -> f64) -> f64 {
+pub(super) fn mean_of_later<T>(images: &[T], value: fn(&T) -> f64) -> f64 {
     images[1..].iter().map(value).sum::<f64>() / (IMAGES - 1) as f64
 }
 

@@ -21,6 +21,8 @@ const SPREAD_RAD: f32 = 0.12;
 const CLOSER: f32 = 0.6;
 /// The direction towards the viewpoints: from the side and above.
 const BACKWARDS: Vec3 = Vec3::new(0.35, 0.65, 1.0);
+/// The least height of a viewpoint over the scene's middle, in diagonals of the scene: far viewpoints are not under the ground.
+const LEAST_HEIGHT: f32 = 0.08;
 /// The number of frames that are drawn at once.
 const FRAMES_AT_ONCE: usize = 4;
 
@@ -29,6 +31,7 @@ pub struct Subject {
     /// The name of the scene.
     pub name: String,
     rig: Rig,
+    diagonal_m: f32,
     pub(super) engine: Arc<GpuEngine>,
     pub(super) scene: Arc<GpuScene>,
     sampler: Sampler,
@@ -61,11 +64,34 @@ impl Subject {
         let setup = args.load()?;
         let hash = setup.offer.hash.to_string();
         engine.put_scene(&hash, &setup.scene)?;
-        let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
+        let bounds = setup.scene.bounds();
+        let rig = raised(&Rig::in_front_of(&bounds, SPREAD_RAD).with_context(|| name.to_owned())?);
         let scene = engine.scene(&hash)?;
         let engine = engine.clone();
         let sampler = Sampler::sharing(engine.renderer.clone());
-        Ok(Self { name: name.to_owned(), rig, engine, scene, sampler })
+        Ok(Self { name: name.to_owned(), rig, diagonal_m: bounds.size().length(), engine, scene, sampler })
+    }
+
+    /// The distance of the two lower viewpoints, in diagonals of the scene.
+    pub fn viewpoint_distance(&self) -> f32 {
+        2.0 * self.rig.half_edges_in_world[0].length() / self.diagonal_m
+    }
+
+    /// The same scene, with viewpoints that are `factor` times as far apart.
+    pub fn spread_by(&self, factor: f32) -> Self {
+        let half_edges_in_world = self.rig.half_edges_in_world.map(|half| half * factor);
+        let mut center_in_world = self.rig.center_in_world;
+        let lowest_m = center_in_world.y - half_edges_in_world[1].y;
+        let least_m = self.rig.target_in_world.y + LEAST_HEIGHT * self.diagonal_m;
+        center_in_world.y += (least_m - lowest_m).max(0.0);
+        Self {
+            name: self.name.clone(),
+            rig: Rig { center_in_world, half_edges_in_world, ..self.rig },
+            engine: self.engine.clone(),
+            scene: self.scene.clone(),
+            sampler: Sampler::sharing(self.engine.renderer.clone()),
+            ..*self
+        }
     }
 
     /// The sample cameras of a method.
