@@ -3,22 +3,9 @@
 use app_core::exit::Outcome;
 use engine::GpuEngine;
 
-use super::measure::{FrontRow, SCENES, Setting, Shadows, TimeRow, front, measure, times};
+use super::measure::{Measured, SCENES, Setting, front, measure, times};
 use super::report::report;
 use crate::study::RunArgs;
-
-/// The parts of a run.
-pub struct Measured {
-    /// All scenes at the paper's size.
-    pub scenes: Vec<Setting>,
-    /// Sides of images (Table 3), sizes of lamps (Table 4), and times by number of triangles (Fig. 9).
-    pub map_sides: Vec<Setting>,
-    pub lamp_sizes: Vec<Setting>,
-    pub times: Vec<TimeRow>,
-    pub shadows: Shadows,
-    /// Error against time of each scene.
-    pub fronts: Vec<(&'static str, Vec<FrontRow>)>,
-}
 
 /// The size of the study.
 #[derive(Debug, Clone, Copy)]

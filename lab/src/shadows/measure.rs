@@ -71,6 +71,19 @@ impl Shadows {
     }
 }
 
+/// The parts of a run.
+pub struct Measured {
+    /// All scenes at the paper's size.
+    pub scenes: Vec<Setting>,
+    /// Sides of images (Table 3), sizes of lamps (Table 4), and times by number of triangles (Fig. 9).
+    pub map_sides: Vec<Setting>,
+    pub lamp_sizes: Vec<Setting>,
+    pub times: Vec<TimeRow>,
+    pub shadows: Shadows,
+    /// Error against time of each scene.
+    pub fronts: Vec<(&'static str, Vec<FrontRow>)>,
+}
+
 /// Measures settings by all samplings, in views of so many pixels a side.
 ///
 /// # Errors

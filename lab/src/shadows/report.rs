@@ -2,8 +2,7 @@
 
 use report::{Axis, Bar, Cell, Check, Mark, Report, Table, XyChart};
 
-use super::command::Measured;
-use super::measure::{FrontRow, OF_SCENE, SAMPLINGS, Setting, ShadowRow, Shadows, TimeRow, TruthRow};
+use super::measure::{FrontRow, Measured, OF_SCENE, SAMPLINGS, Setting, ShadowRow, Shadows, TimeRow, TruthRow};
 use super::paper::{PaperRow, TABLE_3, TABLE_4, TABLE_5};
 use crate::statistics::geometric_mean;
 use crate::study::{Column, check_if_measured, table, with_series};
