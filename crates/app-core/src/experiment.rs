@@ -1,6 +1,7 @@
 //! A scene, a cluster in this process, and a client of it.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use client::{Client, Frame};
@@ -32,6 +33,10 @@ pub struct Delivered {
     /// Seconds from the request to the last frame, decoded and checksummed.
     pub seconds: f64,
 }
+
+/// The longest time until the coordinator has heard of the end of a session, and between two looks.
+const LONGEST_CLOSING: Duration = Duration::from_secs(10);
+const LOOK_AGAIN: Duration = Duration::from_millis(2);
 
 /// Half of a node's memory is for sets on the device, with the images that are relayed. There is room for one set in use and one
 /// to come: every run has sets of its own, and none needs them again.
@@ -107,8 +112,21 @@ impl Experiment {
                 Ok(())
             };
             let seconds = receive(&session, views, received).await?;
-            Ok(Delivered { plan: session.plan(), seconds })
+            let plan = session.plan();
+            drop(session);
+            self.no_session_is_open().await?;
+            Ok(Delivered { plan, seconds })
         })
+    }
+
+    /// Waits until the coordinator has heard that sessions have ended: the next one may have the same samples and another policy.
+    async fn no_session_is_open(&self) -> anyhow::Result<()> {
+        let end = Instant::now() + LONGEST_CLOSING;
+        while !self.client.status().await?.workloads.is_empty() {
+            anyhow::ensure!(Instant::now() < end, "the coordinator does not hear that a session has ended");
+            tokio::time::sleep(LOOK_AGAIN).await;
+        }
+        Ok(())
     }
 
     /// Drains the cluster.
