@@ -114,13 +114,13 @@ impl Experiment {
             let seconds = receive(&session, views, received).await?;
             let plan = session.plan();
             drop(session);
-            self.no_session_is_open().await?;
+            self.wait_for_ended_sessions().await?;
             Ok(Delivered { plan, seconds })
         })
     }
 
     /// Waits until the coordinator has heard that sessions have ended: the next one may have the same samples and another policy.
-    async fn no_session_is_open(&self) -> anyhow::Result<()> {
+    async fn wait_for_ended_sessions(&self) -> anyhow::Result<()> {
         let end = Instant::now() + LONGEST_CLOSING;
         while !self.client.status().await?.workloads.is_empty() {
             anyhow::ensure!(Instant::now() < end, "the coordinator does not hear that a session has ended");

@@ -63,10 +63,11 @@ pub struct SceneArgs {
     /// file
     #[arg(long, default_value_t, value_name = "x|y|z")]
     pub up: UpAxis,
-    /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, soft N (N rays
-    /// a light), or soft NxN (a grid of N by N rays a light, or, with "by maps" or "by samples", shadow maps of rectangle lights). Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that
-    /// show the scene: reflections N (mirrors that a ray meets, 1 to 8). Glossy surfaces that show it, in views drawn
-    /// directly, from a cube or beside a base: glossy N (rays a pixel, 1 to 256)
+    /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, soft N (N rays a light),
+    /// or soft NxN (a grid of N by N rays a light, or, with "by maps" or "by samples", shadow maps of rectangle lights).
+    /// Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that show the
+    /// scene: reflections N (mirrors that a ray meets, 1 to 8). Glossy surfaces that show it, in views drawn directly, from a
+    /// cube or beside a base: glossy N (rays a pixel, 1 to 256)
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun

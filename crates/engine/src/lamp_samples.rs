@@ -10,13 +10,15 @@ use glam::Vec2;
 use gpu::{Frame, Turn};
 use parking_lot::Mutex;
 use reconstruction::{DepthQuads, ReconstructionError, ReconstructionMethod, Reconstructor, SetDescription};
-use render::{DrawWork, GpuScene, GridAnswer, LampMapSource, LampMaps, Lighting, RenderError, Visibility};
+use render::{DrawWork, GpuScene, GridVisibility, LampMapSource, LampMaps, Lighting, RenderError, Visibility};
 use sampling::{SampleWork, Sampler, SamplingError, SamplingMethod};
 
 /// Sides of lamps' images.
 const SIDES_PX: std::ops::RangeInclusive<u32> = 64..=4096;
-/// Moments of scenes whose images are kept: each takes some hundred megabytes a lamp.
+/// Moments of scenes whose images are kept.
 const MOST_KEPT: usize = 2;
+/// Rectangles whose samples a scene may have: each takes some hundred megabytes.
+pub(crate) const MOST_LAMPS: usize = 8;
 
 /// How the images of lamps are taken and drawn: `non_redundant:pixel 1024 hybrid_mesh:0.5`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -82,7 +84,9 @@ impl LampMapSource for Drawn<'_> {
         cameras: &[PinholeCamera],
         reversed_depths: &[wgpu::TextureView],
     ) -> Result<(), RenderError> {
-        let Some(quads) = &self.images.0[lamp] else { return Ok(()) };
+        let Some(quads) = &self.images.0[lamp] else {
+            return Err(RenderError::LampMaps { reason: format!("lamp {lamp} has no samples") });
+        };
         let recorded = self.reconstructor.record_depths(frame, quads, cameras, reversed_depths);
         recorded.map_err(|error| RenderError::LampMaps { reason: error.to_string() })
     }
@@ -107,6 +111,7 @@ pub(crate) struct LampPipelines<'e> {
 /// Why lamps have no images.
 pub(crate) enum LampError {
     NoRectangle,
+    Rectangles { count: usize },
     Sampling(SamplingError),
     Reconstruction(ReconstructionError),
 }
@@ -114,8 +119,10 @@ pub(crate) enum LampError {
 impl<'e> LampPipelines<'e> {
     fn sample(self, of: LampScene<'_>, sampling: LampSampling) -> Result<LampImages, LampError> {
         let rigs = of.scene.lamp_rigs(sampling.side_px);
-        if rigs.iter().all(Option::is_none) {
-            return Err(LampError::NoRectangle);
+        match rigs.iter().flatten().count() {
+            0 => return Err(LampError::NoRectangle),
+            count if count > MOST_LAMPS => return Err(LampError::Rectangles { count }),
+            _ => {}
         }
         let images = rigs.iter().map(|rig| rig.as_ref().map(|rig| self.sample_lamp(rig, of, sampling)).transpose());
         Ok(LampImages(images.collect::<Result<_, _>>()?))
@@ -170,20 +177,31 @@ impl LampSamples {
     ) -> Result<Lamps<'e>, LampError> {
         let sampling = *self.sampling.lock();
         let side_px = sampling.side_px;
-        if lighting.grid_maps() != Some(GridAnswer::Samples) {
+        if lighting.grid_maps() != Some(GridVisibility::Samples) {
             return Ok(Lamps { side_px, images: None });
         }
         let moment = Moment { scene_hash: of.hash.to_owned(), scene_time_s: of.time_s, sampling };
-        let _one = self.making.lock();
         let images = match self.find(&moment) {
             Some(images) => images,
-            None => {
-                let images = Arc::new(pipelines.sample(of, sampling)?);
-                self.keep(moment, images.clone());
-                images
-            }
+            None => self.made(pipelines, of, moment)?,
         };
         Ok(Lamps { side_px, images: Some(Drawn { reconstructor: pipelines.reconstructor, images }) })
+    }
+
+    /// Images that are made now, unless another thread has made them meanwhile.
+    fn made(
+        &self,
+        pipelines: LampPipelines<'_>,
+        of: LampScene<'_>,
+        moment: Moment,
+    ) -> Result<Arc<LampImages>, LampError> {
+        let _one = self.making.lock();
+        if let Some(images) = self.find(&moment) {
+            return Ok(images);
+        }
+        let images = Arc::new(pipelines.sample(of, moment.sampling)?);
+        self.keep(moment, images.clone());
+        Ok(images)
     }
 
     fn find(&self, moment: &Moment) -> Option<Arc<LampImages>> {
@@ -206,7 +224,7 @@ impl LampSamples {
 impl Default for LampSampling {
     fn default() -> Self {
         let reconstruction = ReconstructionMethod::lamp_default();
-        Self { sampling: SamplingMethod::OF_LAMPS, side_px: 1024, reconstruction }
+        Self { sampling: SamplingMethod::OF_LAMPS, side_px: LampMaps::default().side_px, reconstruction }
     }
 }
 

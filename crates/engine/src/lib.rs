@@ -12,7 +12,7 @@ use depth_image::{
     SampleImages, View, ViewPlanes,
 };
 use gpu::{DevicePreference, Gpu, GpuError};
-use lamp_samples::{LampError, LampPipelines, LampSamples, LampScene, Lamps};
+use lamp_samples::{LampError, LampPipelines, LampSamples, LampScene, Lamps, MOST_LAMPS};
 use node::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
     UploadedSet, ViewWork, own_time,
@@ -560,6 +560,12 @@ impl From<LampError> for Caught {
         let reason = "soft NxN by samples needs a rectangle light that shines on the scene, and there is none";
         match error {
             LampError::NoRectangle => Self(invalid("lighting", reason)),
+            LampError::Rectangles { count } => {
+                let reason = format!(
+                    "soft NxN by samples takes at most {MOST_LAMPS} rectangle lights, and the scene has {count}"
+                );
+                Self(invalid("lighting", reason))
+            }
             LampError::Sampling(error) => error.into(),
             LampError::Reconstruction(error) => error.into(),
         }

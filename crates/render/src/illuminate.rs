@@ -73,17 +73,17 @@ impl ShaderVariant for Illuminate {
         lit.retain(|variant| !(variant.bounces && (variant.by_rays || variant.listed)));
         lit.retain(|variant| variant.shadows || !(variant.soft || variant.indirect));
         lit.retain(|variant| variant.ambient || !variant.indirect);
+        let grids = lit.iter().filter(|variant| variant.soft).flat_map(|variant| {
+            let bits = [false, true].into_iter().filter(|bits| !(bits & variant.bounces));
+            bits.map(|bits| Self { grid: true, bits, ..*variant })
+        });
+        lit.extend(grids.collect::<Vec<_>>());
         let indirect = lit.iter().filter(|variant| variant.listed && variant.soft && variant.indirect);
         let indirect = indirect.map(|variant| Self { knows_ambient: true, ..*variant });
         let bent = lit.iter().filter(|variant| variant.by_rays && !variant.continued && !variant.environment_map);
         let bent = bent.filter(|variant| !variant.indirect && [variant.shadows, variant.soft] == [variant.ambient; 2]);
         let bent = bent.map(|variant| Self { single_pole: true, ..*variant });
-        let grids = lit.iter().filter(|variant| variant.soft).flat_map(|variant| {
-            let points = [false, true].into_iter().filter(|bits| !(bits & variant.bounces));
-            points.map(|bits| Self { grid: true, bits, ..*variant })
-        });
-        let grids: Vec<Self> = grids.collect();
-        lit.iter().copied().chain(grids).chain(indirect).chain(bent).flat_map(Self::with_all_sums).collect()
+        lit.iter().copied().chain(indirect).chain(bent).flat_map(Self::with_all_sums).collect()
     }
 }
 

@@ -116,11 +116,11 @@ fn from_lamp(number: u32, spot: Spot) -> Arrival {
 {% endif %}
 {% if bits %}
         let incident = incident_of(number, spot, place);
-        let asks_bits = {{ "!is_bright(number)" if environment_map else "true" }};
-        let open = select(0.0, 1.0, asks_bits && is_open(number, camera.first_shadow_ray + i));
+        let has_bits = {{ "!is_bright(number)" if environment_map else "true" }};
+        let open = select(0.0, 1.0, has_bits && is_open(number, camera.first_shadow_ray + i));
         var ray = Arrival(incident.irradiance_linear * (max(dot(spot.normal, incident.towards), 0.0) * open), open);
 {% if environment_map %}
-        for (var asks = !asks_bits; asks; asks = false) { ray = arrival_of(incident, spot); }
+        for (var needed = !has_bits; needed; needed = false) { ray = arrival_of(incident, spot); }
 {% endif %}
 {% else %}
         let ray = arrival_of(incident_of(number, spot, place), spot);

@@ -5,24 +5,25 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use depth_image::{LampRig, PinholeCamera};
 use glam::Vec3;
-use gpu::{Binding, BufferPool, PooledBuffer, ShaderVariant, switches};
+use gpu::{Binding, BufferPool, Gpu, Lent, PooledBuffer, ShaderVariant, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::BufferUsages;
 
 use crate::batch::{Batch, Recording};
 use crate::grid::grid_place;
 use crate::lamp_maps::{self, MAPS_AT_ONCE, MapLayers, MapPool};
-use crate::lighting::GridAnswer;
+use crate::lighting::GridVisibility;
 use crate::rays::Traversal;
 use crate::{RenderError, raster::Raster, surfaces::Surfaces};
 
 /// Rays that one dispatch traces for a pixel.
 const RAYS_AT_ONCE: u32 = 32;
+
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LampBits {
     by_rays: bool,
     single_pole: bool,
-    /// Shadow maps are asked first.
+    /// Shadow maps are read first.
     pub maps: bool,
     environment_map: bool,
     light_count: usize,
@@ -62,17 +63,18 @@ impl ShaderVariant for LampBits {
     }
 
     fn all() -> Vec<Self> {
-        let all = switches().flat_map(|[by_rays, maps, environment_map]| {
-            let plain = Self {
+        let all = switches().flat_map(|[by_rays, single_pole, maps, environment_map]| {
+            Traversal::ALL.map(|traversal| Self {
                 by_rays,
-                single_pole: false,
+                single_pole,
                 maps,
                 environment_map,
                 light_count: 1,
-                traversal: Traversal::ALL[0],
-            };
-            Traversal::ALL.map(|traversal| Self { traversal, ..plain })
+                traversal,
+            })
         });
+        // Rays around a pole find surfaces.
+        let all = all.filter(|variant| variant.by_rays || !variant.single_pole);
         all.collect()
     }
 }
@@ -85,53 +87,53 @@ pub(crate) fn lend(pool: &BufferPool, batch: &Batch<'_>) -> Option<PooledBuffer>
     (is_used && bytes > 0).then(|| pool.lend_storage("which places of lamps pixels see", bytes))
 }
 
-/// Records the bits of all lamps for the rays of this position and step: maps of some places, and what pixels see of them.
+/// Maps on loan for the light of a batch, which must live until its frame is done.
+pub(crate) fn lend_maps(gpu: &Gpu, pool: &MapPool, batch: &Batch<'_>) -> Option<Lent<u32, MapLayers>> {
+    let work = batch.work;
+    work.lighting.grid_maps().map(|_| lamp_maps::lend(gpu, pool, work.lamp_maps.side_px))
+}
+
+/// Records the bits of all lamps for the rays of this position and step: some maps, and what pixels see of their places.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     raster: &Raster,
-    maps: &MapPool,
+    layers: Option<&MapLayers>,
     surfaces: &[Surfaces],
 ) -> Result<(), RenderError> {
     if recording.lamp_bits.is_none() {
         return Ok(());
     }
-    let batch = recording.batch;
-    let work = batch.work;
-    let answer = work.lighting.grid_maps();
+    let work = recording.batch.work;
+    let rays = recording.sums.rays[0].clone();
     for (lamp, rig) in work.scene.lamp_rigs(work.lamp_maps.side_px).into_iter().enumerate() {
-        let rig = rig.filter(|_| answer.is_some());
-        let at_once = if rig.is_some() { MAPS_AT_ONCE } else { RAYS_AT_ONCE };
-        let rays = recording.sums.rays[0].clone();
+        let mapped = rig.zip(layers);
+        let at_once = mapped.map_or(RAYS_AT_ONCE, |(_, layers)| layers.each.len() as u32);
         for first in rays.clone().step_by(at_once as usize) {
             let chunk = first..(first + at_once).min(rays.end);
-            match rig.zip(answer) {
-                Some((rig, answer)) => {
-                    let layers = lamp_maps::lend(recording.gpu, maps, work.lamp_maps.side_px);
-                    let cameras = cameras_of(batch, &rig, chunk.clone());
-                    match (answer, work.lamp_maps.samples) {
-                        (GridAnswer::Samples, Some(samples)) => {
-                            samples.record(&mut recording.frame, lamp, &cameras, &layers.each)?;
-                        }
-                        _ => raster.record_maps(&mut recording.frame, &work, &cameras, &layers.each)?,
-                    }
-                    let uniform = GpuLampMaps::new(&cameras);
-                    let uniform = recording.gpu.buffer_with("cameras on a lamp", &[uniform], BufferUsages::UNIFORM);
-                    ask(recording, surfaces, lamp, chunk, Some(AskedMaps { uniform: &uniform, layers: &layers }))?;
-                }
-                None => ask(recording, surfaces, lamp, chunk, None)?,
+            let Some((rig, layers)) = mapped else {
+                find(recording, surfaces, lamp, chunk, None)?;
+                continue;
+            };
+            let cameras = cameras_of(recording.batch, &rig, chunk.clone());
+            match work.lamp_maps.samples.filter(|_| work.lighting.grid_maps() == Some(GridVisibility::Samples)) {
+                Some(samples) => samples.record(&mut recording.frame, lamp, &cameras, &layers.each)?,
+                None => raster.record_maps(&mut recording.frame, &work, &cameras, &layers.each)?,
             }
+            let uniform = GpuLampMaps::new(&cameras);
+            let uniform = recording.gpu.buffer_with("cameras on a lamp", &[uniform], BufferUsages::UNIFORM);
+            find(recording, surfaces, lamp, chunk, Some(DrawnMaps { uniform: &uniform, layers }))?;
         }
     }
     Ok(())
 }
 
 /// Maps, and the uniform of their cameras.
-struct AskedMaps<'m> {
+struct DrawnMaps<'m> {
     uniform: &'m wgpu::Buffer,
     layers: &'m MapLayers,
 }
 
-impl AskedMaps<'_> {
+impl DrawnMaps<'_> {
     fn bindings(&self) -> [Binding<'_>; 2] {
         [Binding::buffer("lamp_maps", self.uniform), self.layers.binding()]
     }
@@ -144,12 +146,13 @@ fn cameras_of(batch: &Batch<'_>, rig: &LampRig, rays: Range<u32>) -> Vec<Pinhole
     rays.map(|ray| rig.camera(grid_place(side, first + ray))).collect()
 }
 
-fn ask(
+/// Records the pass over all pixels for some rays to a lamp.
+fn find(
     recording: &mut Recording<'_>,
     surfaces: &[Surfaces],
     lamp: usize,
     rays: Range<u32>,
-    maps: Option<AskedMaps<'_>>,
+    maps: Option<DrawnMaps<'_>>,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
@@ -167,7 +170,7 @@ fn ask(
         let own = [Binding::buffer("camera", &cameras)]
             .into_iter()
             .chain(target.bindings())
-            .chain(maps.iter().flat_map(AskedMaps::bindings));
+            .chain(maps.iter().flat_map(DrawnMaps::bindings));
         let bound = recording.bind(&variant, detail, own)?;
         recording.dispatch(&bound, camera);
     }

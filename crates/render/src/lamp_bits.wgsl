@@ -43,7 +43,7 @@ const OPEN: u32 = 0u;
 const BLOCKED: u32 = 1u;
 const BEYOND: u32 = 2u;
 
-fn asked_of_map(layer: u32, spot: Spot, cosine: f32) -> u32 {
+fn seen_in_map(layer: u32, spot: Spot, cosine: f32) -> u32 {
     let near_m = lamp_maps.points[layer].near_m;
     let focal_px = vec2f(lamp_maps.focal_x_px, lamp_maps.focal_y_px);
     let from_eye = spot.point - lamp_maps.points[layer].eye_in_world;
@@ -64,17 +64,17 @@ fn asked_of_map(layer: u32, spot: Spot, cosine: f32) -> u32 {
 fn sees(lamp: u32, spot: Spot, i: u32) -> bool {
     let incident = incident_from(illumination.lights[lamp], spot.point, grid_place(camera.first_shadow_ray + i));
     let cosine = dot(spot.normal, incident.towards);
-    var asks_ray = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0));
-    var open = asks_ray;
+    var needs_ray = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0));
+    var open = needs_ray;
 {% if maps %}
-    if asks_ray {
-        let answer = asked_of_map(i, spot, cosine);
-        open = answer == OPEN;
-        asks_ray = answer == BEYOND;
+    if needs_ray {
+        let seen = seen_in_map(i, spot, cosine);
+        open = seen == OPEN;
+        needs_ray = seen == BEYOND;
     }
 {% endif %}
     // A loop, not a branch: the software device skips only loops that no lane needs.
-    for (; asks_ray; asks_ray = false) {
+    for (; needs_ray; needs_ray = false) {
         open = !is_blocked(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
     }
     return open;
@@ -101,7 +101,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             bits = lamp_bits[first_word + word];
         }
         var open = false;
-        for (var asks = found; asks; asks = false) { open = sees(lamp, spot, i); }
+        for (var needed = found; needed; needed = false) { open = sees(lamp, spot, i); }
         bits = insertBits(bits, select(0u, 1u, open), bit % 32u, 1u);
     }
     lamp_bits[first_word + word] = bits;

@@ -6,12 +6,12 @@ use wgpu::{TextureUsages, TextureView, TextureViewDimension};
 
 use crate::RenderError;
 
-/// Maps that are drawn and asked together: 64 MiB of 1024².
+/// The most maps that are drawn and read together.
 pub(crate) const MAPS_AT_ONCE: u32 = 16;
+/// Their most bytes, unless one alone has more: sixteen of 1024².
+const MOST_BYTES: u64 = 64 << 20;
 /// The sides of shadow maps.
 pub(crate) const DEFAULT_SIDE_PX: u32 = 1024;
-/// The most bytes of free maps.
-const MOST_FREE_BYTES: u64 = 64 << 20;
 
 /// Draws shadow maps from samples of what lamps see.
 pub trait LampMapSource: Sync {
@@ -43,7 +43,7 @@ impl Default for LampMaps<'_> {
     }
 }
 
-/// A texture with a layer for each map.
+/// A texture with a layer for each of the maps that are drawn together.
 pub(crate) struct MapLayers {
     all: TextureView,
     pub each: Vec<TextureView>,
@@ -53,7 +53,15 @@ pub(crate) struct MapLayers {
 pub(crate) type MapPool = Pool<u32, MapLayers>;
 
 pub(crate) fn pool(gpu: &Gpu) -> MapPool {
-    Pool::of_device(gpu, MOST_FREE_BYTES, |&side_px| 4 * u64::from(side_px).pow(2) * u64::from(MAPS_AT_ONCE))
+    Pool::of_device(gpu, MOST_BYTES, |&side_px| map_bytes(side_px) * u64::from(layers(side_px)))
+}
+
+fn map_bytes(side_px: u32) -> u64 {
+    4 * u64::from(side_px).pow(2)
+}
+
+fn layers(side_px: u32) -> u32 {
+    (MOST_BYTES / map_bytes(side_px).max(1)).clamp(1, MAPS_AT_ONCE.into()) as u32
 }
 
 /// Textures on loan, with whatever the last borrower left.
@@ -64,11 +72,12 @@ pub(crate) fn lend(gpu: &Gpu, pool: &MapPool, side_px: u32) -> Lent<u32, MapLaye
 impl MapLayers {
     fn new(gpu: &Gpu, side_px: u32) -> Self {
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
-        let size = [side_px, side_px, MAPS_AT_ONCE];
+        let layers = layers(side_px);
+        let size = [side_px, side_px, layers];
         let texture = gpu.texture("shadow maps", size, DrawPass::DEPTH_FORMAT, usage);
         Self {
-            all: view_of(&texture, TextureViewDimension::D2Array, 0, MAPS_AT_ONCE),
-            each: (0..MAPS_AT_ONCE).map(|layer| view_of(&texture, TextureViewDimension::D2, layer, 1)).collect(),
+            all: view_of(&texture, TextureViewDimension::D2Array, 0, layers),
+            each: (0..layers).map(|layer| view_of(&texture, TextureViewDimension::D2, layer, 1)).collect(),
         }
     }
 
@@ -84,4 +93,16 @@ fn view_of(texture: &wgpu::Texture, dimension: TextureViewDimension, base_array_
         array_layer_count: Some(count),
         ..Default::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_that_are_drawn_together_take_64_mib_at_most() {
+        let bytes = |side_px| map_bytes(side_px) * u64::from(layers(side_px));
+        assert_eq!([64, 1024, 2048, 4096].map(layers), [16, 16, 4, 1]);
+        assert!([64, 1000, 1024, 1500, 4096].into_iter().all(|side_px| bytes(side_px) <= MOST_BYTES));
+    }
 }

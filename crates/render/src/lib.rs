@@ -54,7 +54,7 @@ pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use lamp_maps::{LampMapSource, LampMaps};
 pub use light_samples::LightCache;
-pub use lighting::{Ambient, Direct, GridAnswer, Lighting, MAX_GRID_SIDE, MAX_RAYS, UnknownLighting};
+pub use lighting::{Ambient, Direct, GridVisibility, Lighting, MAX_GRID_SIDE, MAX_RAYS, UnknownLighting};
 pub use rays::AccelerationReport;
 pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;

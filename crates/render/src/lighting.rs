@@ -45,12 +45,12 @@ pub enum Direct {
     /// This many rays to places spread over every lamp.
     Soft(NonZeroU32),
     /// A regular grid of places on every lamp, with this many along a side (Xie et al., Algorithm 5).
-    Grid(NonZeroU32, GridAnswer),
+    Grid(NonZeroU32, GridVisibility),
 }
 
-/// How a grid on a rectangle is asked which of its places a point sees; other lamps are asked by rays.
+/// How the places of a rectangle's grid that a point sees are found; those of other lamps are found by rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum GridAnswer {
+pub enum GridVisibility {
     /// One ray to each place.
     #[default]
     Rays,
@@ -121,8 +121,8 @@ impl Lighting {
 
     /// Where shadow maps of rectangles come from; `None` for light that needs none.
     #[must_use]
-    pub fn grid_maps(&self) -> Option<GridAnswer> {
-        if let Direct::Grid(_, maps @ (GridAnswer::Maps | GridAnswer::Samples)) = self.direct {
+    pub fn grid_maps(&self) -> Option<GridVisibility> {
+        if let Direct::Grid(_, maps @ (GridVisibility::Maps | GridVisibility::Samples)) = self.direct {
             Some(maps)
         } else {
             None
@@ -186,7 +186,11 @@ impl Lighting {
     fn with_rays(&self, rays: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
         let direct = match self.direct {
             Direct::Soft(to_lamps) => Direct::Soft(rays(to_lamps)),
-            Direct::Grid(side, answer) => Direct::Grid(side_of_square(rays(side.saturating_mul(side))), answer),
+            Direct::Grid(side, visibility) => match side_of_square(rays(side.saturating_mul(side))) {
+                // The middle of the lamp needs no map.
+                NonZeroU32::MIN => Direct::Shadows,
+                fewer => Direct::Grid(fewer, visibility),
+            },
             other => other,
         };
         let ambient = self.ambient.map(|ambient| match ambient {
@@ -241,10 +245,11 @@ impl FromStr for Lighting {
                 ["soft", n] if !n.contains('x') => {
                     direct.replace(Direct::Soft(count(text, n, "rays", MAX_RAYS)?)).is_some()
                 }
-                ["soft", n] => direct.replace(Direct::Grid(grid_side(text, n)?, GridAnswer::Rays)).is_some(),
-                ["soft", n, "by", answer] => {
-                    let answer = GridAnswer::named(answer).ok_or_else(|| UnknownLighting::Term(term.to_owned()))?;
-                    direct.replace(Direct::Grid(grid_side(text, n)?, answer)).is_some()
+                ["soft", n] => direct.replace(Direct::Grid(grid_side(text, n)?, GridVisibility::Rays)).is_some(),
+                ["soft", n, "by", visibility] => {
+                    let named = GridVisibility::named(visibility);
+                    let visibility = named.ok_or_else(|| UnknownLighting::Term(term.to_owned()))?;
+                    direct.replace(Direct::Grid(grid_side(text, n)?, visibility)).is_some()
                 }
                 ["occlusion", n] => {
                     ambient.replace(Ambient::Occlusion(count(text, n, "rays", MAX_RAYS)?, None)).is_some()
@@ -304,12 +309,12 @@ fn side_of_square(places: NonZeroU32) -> NonZeroU32 {
     NonZeroU32::new(places.get().isqrt()).unwrap_or(NonZeroU32::MIN)
 }
 
-impl GridAnswer {
+impl GridVisibility {
     /// All with their words.
     const NAMES: [(Self, &str); 3] = [(Self::Rays, "rays"), (Self::Maps, "maps"), (Self::Samples, "samples")];
 
     fn named(word: &str) -> Option<Self> {
-        Self::NAMES.into_iter().find(|(_, name)| *name == word).map(|(answer, _)| answer)
+        Self::NAMES.into_iter().find(|(_, name)| *name == word).map(|(visibility, _)| visibility)
     }
 }
 
@@ -325,9 +330,9 @@ impl fmt::Display for Lighting {
             Direct::Phong => write!(f, "phong")?,
             Direct::Shadows => write!(f, "shadows")?,
             Direct::Soft(rays) => write!(f, "soft {rays}")?,
-            Direct::Grid(side, GridAnswer::Rays) => write!(f, "soft {side}x{side}")?,
-            Direct::Grid(side, GridAnswer::Maps) => write!(f, "soft {side}x{side} by maps")?,
-            Direct::Grid(side, GridAnswer::Samples) => write!(f, "soft {side}x{side} by samples")?,
+            Direct::Grid(side, GridVisibility::Rays) => write!(f, "soft {side}x{side}")?,
+            Direct::Grid(side, GridVisibility::Maps) => write!(f, "soft {side}x{side} by maps")?,
+            Direct::Grid(side, GridVisibility::Samples) => write!(f, "soft {side}x{side} by samples")?,
         }
         match self.ambient {
             Some(Ambient::Occlusion(rays, Some(radius_m))) => write!(f, ", occlusion {rays} {radius_m}m")?,
@@ -441,6 +446,8 @@ mod tests {
         assert_eq!(here("soft 128, occlusion 64", LightCacheQuality::Fine), "soft 128, occlusion 64");
         assert_eq!(here("soft 128, occlusion 8", LightCacheQuality::Fast), "soft 32, occlusion 4");
         assert_eq!(here("soft 16x16 by maps", balanced), "soft 8x8 by maps");
+        let preview = |text: &str| text.parse::<Lighting>().expect(text).with_at_most_rays(NonZeroU32::MIN).to_string();
+        assert_eq!(preview("soft 16x16 by samples, occlusion 4"), "shadows, occlusion 1");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, LayerSelection, SamplePlanes};
 use crate::{
-    GpuScene, GridAnswer, Lighting, RenderError,
+    GpuScene, GridVisibility, Lighting, RenderError,
     layers::{self, LayerKind, Layers},
     redundancy_test::RedundancyTest,
     stages::Stages,
@@ -398,7 +398,7 @@ impl Renderer {
             Visibility::Measured => self.is_by_rays(work, cameras[0].reference())?,
         };
         let lighting = work.lighting;
-        if lighting.grid_maps() == Some(GridAnswer::Samples) && work.lamp_maps.samples.is_none() {
+        if lighting.grid_maps() == Some(GridVisibility::Samples) && work.lamp_maps.samples.is_none() {
             return Err(RenderError::LampSamples { lighting: lighting.to_string() });
         }
         let needs_tree = by_rays || work.lighting.is_traced();

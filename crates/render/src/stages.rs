@@ -9,7 +9,7 @@ use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
-use crate::lamp_maps::{self, MapPool};
+use crate::lamp_maps::{self, MapLayers, MapPool};
 use crate::light_cache::{self, Picture};
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
@@ -30,6 +30,14 @@ pub(crate) struct Stages {
     pub raster: Raster,
     pub passes: PassCache,
     pub batches: JobLimit,
+}
+
+/// Memory of a batch, on loan until its frame is done.
+#[derive(Clone, Copy)]
+struct Lendings<'l> {
+    planes: &'l Planes,
+    mirrored: Option<&'l Reflections>,
+    maps: Option<&'l MapLayers>,
 }
 
 impl Stages {
@@ -68,11 +76,13 @@ impl Stages {
         let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, lamp_bits, frame };
         let surfaces: Vec<Surfaces> = (0..batch.cameras.len()).map(|place| self.lend(batch, place)).collect();
         let planes = Planes::lend(gpu, pool, batch)?;
+        let maps = lamp_bits::lend_maps(gpu, &self.maps, batch);
         let mut lists = Vec::new();
         for position in &positions {
             recording.cameras = position.uniform_of_all(gpu, &recording.pieces, &recording.sums);
             recording.batch = position;
-            lists.extend(self.record_position(&mut recording, &surfaces, &planes, mirrored.as_ref())?);
+            let lent = Lendings { planes: &planes, mirrored: mirrored.as_ref(), maps: maps.as_deref() };
+            lists.extend(self.record_position(&mut recording, &surfaces, lent)?);
         }
         let Recording { sums, lamp_bits, mut frame, .. } = recording;
         let wanted_bits = lamp_bits.as_deref().filter(|_| batch.output.lamp_bits);
@@ -83,7 +93,7 @@ impl Stages {
         let host = pool.lend_host("planes read-back", bytes.max(4));
         let read = frame.read_back(wanted_bits.unwrap_or(&planes.words), 0..bytes, host);
         let result = frame.submit()?.wait()?;
-        drop((surfaces, lists, planes, mirrored, lamp_bits));
+        drop((surfaces, lists, planes, mirrored, lamp_bits, maps));
         if batch.work.refinement.goes_on() {
             self.accumulations.put(batch.key(), sums);
         }
@@ -109,12 +119,15 @@ impl Stages {
         &self,
         recording: &mut Recording<'_>,
         surfaces: &[Surfaces],
-        planes: &Planes,
-        mirrored: Option<&Reflections>,
+        lent: Lendings<'_>,
     ) -> Result<Vec<PixelList>, RenderError> {
+        let Lendings { planes, mirrored, maps } = lent;
         match recording.batch.sequence {
             Some(sequence) => self.find_in_sequence(recording, sequence, surfaces)?,
             None => self.find(recording, 0, surfaces, None)?,
+        }
+        if recording.batch.work.lighting.is_lit() && recording.batch.has_color() {
+            lamp_bits::record(recording, &self.raster, maps, surfaces)?;
         }
         let lists = self.light(recording, surfaces, planes)?;
         if let Some(mirrored) = mirrored.filter(|_| recording.batch.has_color()) {
@@ -183,9 +196,6 @@ impl Stages {
     ) -> Result<Vec<PixelList>, RenderError> {
         let batch = recording.batch;
         let mut all = Vec::new();
-        if batch.work.lighting.is_lit() && batch.has_color() {
-            lamp_bits::record(recording, &self.raster, &self.maps, surfaces)?;
-        }
         if let Some(covered_by) = batch.covered_by {
             let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
             for (camera, target) in surfaces.iter().enumerate() {

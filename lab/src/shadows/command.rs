@@ -79,7 +79,7 @@ fn take(engine: &GpuEngine, extent: Extent) -> anyhow::Result<Measured> {
             settings.push(*setting);
         }
     }
-    let shadows = measure(engine, &settings, extent.view_px)?;
+    let shadows = measure(engine, &settings, &scenes, extent.view_px)?;
     let most_rays = if extent.quick { 64 } else { 256 };
     let mut fronts = Vec::new();
     for setting in &scenes {

@@ -1,8 +1,11 @@
 //! Errors of visibility and intensity (Xie et al. 2016, §6.2).
 
 use depth_image::View;
+use image::{Rgb, RgbImage};
 
 use super::subject::GRID_SIDE;
+
+const BACKGROUND: [u8; 3] = [24, 24, 48];
 
 /// Words of a pixel's bits.
 const WORDS: usize = (GRID_SIDE * GRID_SIDE / 32) as usize;
@@ -51,9 +54,10 @@ impl ShadowErrors {
         let [mut lit, mut penumbra, mut umbra] = [Mean::default(); 3];
         let mut most = 0.0_f64;
         let pixels = shown.iter().zip(truth.chunks_exact(WORDS)).zip(test.chunks_exact(WORDS));
-        for (_, (truth, test)) in
-            pixels.filter(|((depth, _), _)| **depth > 0.0).map(|((depth, truth), test)| (depth, (truth, test)))
-        {
+        for ((depth, truth), test) in pixels {
+            if *depth <= 0.0 {
+                continue;
+            }
             let open = f64::from(seen(truth));
             let difference = (f64::from(seen(test)) - open) * scale;
             let wrong: u32 = truth.iter().zip(test).map(|(a, b)| (a ^ b).count_ones()).sum();
@@ -78,6 +82,18 @@ impl ShadowErrors {
             umbra: umbra.value(),
         }
     }
+}
+
+/// The share of the lamp that each pixel sees, as a grey; background where no surface is shown.
+pub fn share_picture(bits: &[u32], view: &View) -> RgbImage {
+    let shown = view.inverse_depth_per_m.as_deref().unwrap_or_default();
+    let mut picture = RgbImage::from_pixel(view.size_px.x, view.size_px.y, Rgb(BACKGROUND));
+    for ((pixel, depth), bits) in picture.pixels_mut().zip(shown).zip(bits.chunks_exact(WORDS)) {
+        if *depth > 0.0 {
+            *pixel = Rgb([(seen(bits) * 255 / (GRID_SIDE * GRID_SIDE)) as u8; 3]);
+        }
+    }
+    picture
 }
 
 fn seen(bits: &[u32]) -> u32 {

@@ -2,10 +2,10 @@
 
 use depth_image::View;
 use engine::{GpuEngine, LampSampling};
-use report::Point;
+use report::{Picture, PictureRow, Point};
 use sampling::SamplingMethod;
 
-use super::errors::ShadowErrors;
+use super::errors::{ShadowErrors, share_picture};
 use super::subject::{Answer, GRID_SIDE, LampBits, Subject};
 use crate::study::measure_rows;
 
@@ -57,6 +57,8 @@ pub struct TruthRow {
 pub struct Shadows {
     pub truths: Vec<TruthRow>,
     pub rows: Vec<ShadowRow>,
+    /// The share of the lamp that is seen, of scenes at the usual size.
+    pub pictures: Vec<PictureRow>,
 }
 
 impl Shadows {
@@ -88,17 +90,43 @@ pub struct Measured {
 ///
 /// # Errors
 /// A scene cannot be used, or the device fails.
-pub fn measure(engine: &GpuEngine, settings: &[Setting], view_px: u32) -> anyhow::Result<Shadows> {
+pub fn measure(
+    engine: &GpuEngine,
+    settings: &[Setting],
+    pictured: &[Setting],
+    view_px: u32,
+) -> anyhow::Result<Shadows> {
     let mut shadows = Shadows::default();
-    let measured = measure_rows("shadows", settings.iter().copied(), |setting| of_setting(engine, setting, view_px))?;
-    for (truth, rows) in measured {
-        shadows.truths.push(truth);
-        shadows.rows.extend(rows);
+    for measured in measure_rows("shadows", settings.iter().copied(), |setting| of_setting(engine, setting, view_px))? {
+        if pictured.contains(&measured.truth.setting) {
+            shadows.pictures.push(measured.picture_row());
+        }
+        shadows.truths.push(measured.truth);
+        shadows.rows.extend(measured.rows);
     }
     Ok(shadows)
 }
 
-fn of_setting(engine: &GpuEngine, setting: Setting, view_px: u32) -> anyhow::Result<(TruthRow, Vec<ShadowRow>)> {
+/// One setting with the bits of every answer, by name.
+struct MeasuredSetting {
+    truth: TruthRow,
+    rows: Vec<ShadowRow>,
+    view: View,
+    bits: Vec<(&'static str, Vec<u32>)>,
+}
+
+impl MeasuredSetting {
+    fn picture_row(&self) -> PictureRow {
+        let scene = self.truth.setting.scene;
+        let pictures = self.bits.iter().map(|(answer, words)| {
+            Picture::new(format!("{scene} by {answer}"), (*answer).to_owned(), share_picture(words, &self.view))
+        });
+        let title = format!("{scene}: the share of the lamp that is seen (Figs 1 and 8)");
+        PictureRow { title, pictures: pictures.collect() }
+    }
+}
+
+fn of_setting(engine: &GpuEngine, setting: Setting, view_px: u32) -> anyhow::Result<MeasuredSetting> {
     let subject = Subject::load(engine, setting.scene, setting.lamp_size, view_px)?;
     let (view, _) = subject.view("unlit")?;
     let maps = warm_bits(&subject, Answer::Maps { side_px: setting.map_px }, GRID_SIDE)?;
@@ -111,6 +139,7 @@ fn of_setting(engine: &GpuEngine, setting: Setting, view_px: u32) -> anyhow::Res
         rays_s: rays.seconds,
     };
     let mut rows = Vec::new();
+    let mut bits = vec![("rays", rays.words.clone()), (OF_SCENE, maps.words.clone())];
     for sampling in SAMPLINGS {
         let sampled = by_samples(&subject, sampling, setting.map_px, GRID_SIDE)?;
         rows.push(ShadowRow {
@@ -121,8 +150,9 @@ fn of_setting(engine: &GpuEngine, setting: Setting, view_px: u32) -> anyhow::Res
             images_s: sampled.images_s,
             maps_s: sampled.bits.seconds,
         });
+        bits.push((sampling, sampled.bits.words));
     }
-    Ok((truth, rows))
+    Ok(MeasuredSetting { truth, rows, view, bits })
 }
 
 /// Bits, after a small run that builds shaders and trees.

@@ -78,6 +78,7 @@ pub fn report(measured: &Measured, report: &mut Report) -> anyhow::Result<()> {
         );
         report.charts.push(with_series(chart, rows, Mark::Line, |row| row.answer.to_owned(), FrontRow::point));
     }
+    report.pictures.extend(shadows.pictures.iter().cloned());
     report.checks.extend(checks(measured));
     report.summary = fronts_summary(measured);
     Ok(())

@@ -82,3 +82,15 @@ fn a_scene_without_a_rectangle_is_refused_with_the_reason() {
     assert_eq!(field, "lighting");
     assert!(reason.contains("rectangle light"), "{reason}");
 }
+
+#[test]
+fn a_scene_with_too_many_rectangles_is_refused_with_their_number() {
+    let mut scene = scene();
+    scene.illumination.lights = vec![scene.illumination.lights[0]; 9];
+    engine().put_scene("nine rectangles", &scene).expect("a scene");
+    let refused = drawn(engine(), "nine rectangles", camera(&scene), "soft 4x4 by samples");
+    assert!(
+        matches!(&refused, Err(EngineError::InvalidArgument { field: "lighting", reason }) if reason.contains("has 9"))
+    );
+    drawn(engine(), "nine rectangles", camera(&scene), "soft 2x2 by maps").expect("maps are drawn one after the other");
+}
