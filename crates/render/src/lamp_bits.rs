@@ -5,13 +5,14 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use depth_image::{LampRig, PinholeCamera};
 use glam::Vec3;
-use gpu::{Binding, BufferPool, Gpu, Lent, PooledBuffer, ShaderVariant, switches};
+use gpu::{Binding, BufferPool, Gpu, Lent, Pool, PooledBuffer, ShaderVariant, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::BufferUsages;
 
 use crate::batch::{Batch, Recording};
 use crate::grid::grid_place;
-use crate::lamp_maps::{self, MAPS_AT_ONCE, MapLayers, MapPool};
+use crate::lamp_maps::{self, MAPS_AT_ONCE};
+use crate::layers::{LayerKind, Layers};
 use crate::lighting::GridVisibility;
 use crate::rays::Traversal;
 use crate::{RenderError, raster::Raster, surfaces::Surfaces};
@@ -88,16 +89,21 @@ pub(crate) fn lend(pool: &BufferPool, batch: &Batch<'_>) -> Option<PooledBuffer>
 }
 
 /// Maps on loan for the light of a batch, which must live until its frame is done.
-pub(crate) fn lend_maps(gpu: &Gpu, pool: &MapPool, batch: &Batch<'_>) -> Option<Lent<u32, MapLayers>> {
-    let work = batch.work;
-    work.lighting.grid_maps().map(|_| lamp_maps::lend(gpu, pool, work.lamp_maps.side_px))
+pub(crate) fn lend_maps(
+    gpu: &Gpu,
+    pool: &Pool<LayerKind, Layers>,
+    batch: &Batch<'_>,
+) -> Option<Lent<LayerKind, Layers>> {
+    let kind = lamp_maps::kind(batch.work.lamp_maps.side_px);
+    let is_used = batch.work.lighting.grid_maps().is_some();
+    is_used.then(|| pool.lend(kind, |&(size, format)| Layers::new(gpu, size, format)))
 }
 
 /// Records the bits of all lamps for the rays of this position and step: some maps, and what pixels see of their places.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     raster: &Raster,
-    layers: Option<&MapLayers>,
+    layers: Option<&Layers>,
     surfaces: &[Surfaces],
 ) -> Result<(), RenderError> {
     if recording.lamp_bits.is_none() {
@@ -121,7 +127,8 @@ pub(crate) fn record(
             }
             let uniform = GpuLampMaps::new(&cameras);
             let uniform = recording.gpu.buffer_with("cameras on a lamp", &[uniform], BufferUsages::UNIFORM);
-            find(recording, surfaces, lamp, chunk, Some(DrawnMaps { uniform: &uniform, layers }))?;
+            let maps = layers.first(layers.each.len());
+            find(recording, surfaces, lamp, chunk, Some(DrawnMaps { uniform: &uniform, maps: &maps }))?;
         }
     }
     Ok(())
@@ -130,12 +137,12 @@ pub(crate) fn record(
 /// Maps, and the uniform of their cameras.
 struct DrawnMaps<'m> {
     uniform: &'m wgpu::Buffer,
-    layers: &'m MapLayers,
+    maps: &'m wgpu::TextureView,
 }
 
 impl DrawnMaps<'_> {
     fn bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::buffer("lamp_maps", self.uniform), self.layers.binding()]
+        [Binding::buffer("lamp_maps", self.uniform), Binding::texture("maps", self.maps)]
     }
 }
 

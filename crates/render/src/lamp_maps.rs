@@ -1,10 +1,10 @@
 //! Shadow maps from places of a rectangle: what is nearest to each of them, of the scene or of samples of it.
 
 use depth_image::PinholeCamera;
-use gpu::{Binding, DrawPass, Frame, Gpu, Lent, Pool};
-use wgpu::{TextureUsages, TextureView, TextureViewDimension};
+use gpu::{DrawPass, Frame};
+use wgpu::TextureView;
 
-use crate::RenderError;
+use crate::{RenderError, layers::LayerKind};
 
 /// The most maps that are drawn and read together.
 pub(crate) const MAPS_AT_ONCE: u32 = 16;
@@ -43,17 +43,9 @@ impl Default for LampMaps<'_> {
     }
 }
 
-/// A texture with a layer for each of the maps that are drawn together.
-pub(crate) struct MapLayers {
-    all: TextureView,
-    pub each: Vec<TextureView>,
-}
-
-/// Textures of maps by their side.
-pub(crate) type MapPool = Pool<u32, MapLayers>;
-
-pub(crate) fn pool(gpu: &Gpu) -> MapPool {
-    Pool::of_device(gpu, MOST_BYTES, |&side_px| map_bytes(side_px) * u64::from(layers(side_px)))
+/// The texture of maps of a side, with a layer for each that is drawn together with others.
+pub(crate) fn kind(side_px: u32) -> LayerKind {
+    ([side_px, side_px, layers(side_px)], DrawPass::DEPTH_FORMAT)
 }
 
 fn map_bytes(side_px: u32) -> u64 {
@@ -62,37 +54,6 @@ fn map_bytes(side_px: u32) -> u64 {
 
 fn layers(side_px: u32) -> u32 {
     (MOST_BYTES / map_bytes(side_px).max(1)).clamp(1, MAPS_AT_ONCE.into()) as u32
-}
-
-/// Textures on loan, with whatever the last borrower left.
-pub(crate) fn lend(gpu: &Gpu, pool: &MapPool, side_px: u32) -> Lent<u32, MapLayers> {
-    pool.lend(side_px, |&side_px| MapLayers::new(gpu, side_px))
-}
-
-impl MapLayers {
-    fn new(gpu: &Gpu, side_px: u32) -> Self {
-        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
-        let layers = layers(side_px);
-        let size = [side_px, side_px, layers];
-        let texture = gpu.texture("shadow maps", size, DrawPass::DEPTH_FORMAT, usage);
-        Self {
-            all: view_of(&texture, TextureViewDimension::D2Array, 0, layers),
-            each: (0..layers).map(|layer| view_of(&texture, TextureViewDimension::D2, layer, 1)).collect(),
-        }
-    }
-
-    pub fn binding(&self) -> Binding<'_> {
-        Binding::texture("maps", &self.all)
-    }
-}
-
-fn view_of(texture: &wgpu::Texture, dimension: TextureViewDimension, base_array_layer: u32, count: u32) -> TextureView {
-    texture.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(dimension),
-        base_array_layer,
-        array_layer_count: Some(count),
-        ..Default::default()
-    })
 }
 
 #[cfg(test)]

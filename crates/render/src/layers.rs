@@ -1,4 +1,4 @@
-//! Textures with a texel for each sample and a layer for each image of a set.
+//! Textures with a layer for each image of a set, or for each shadow map.
 
 use glam::UVec2;
 use gpu::{Gpu, Pool};
@@ -26,8 +26,11 @@ pub(crate) fn pool(gpu: &Gpu) -> Pool<LayerKind, Layers> {
 
 impl Layers {
     pub fn new(gpu: &Gpu, size: [u32; 3], format: TextureFormat) -> Self {
-        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING;
-        let all = gpu.texture("held samples", size, format, usage);
+        // Shaders do not write depth.
+        let stored =
+            if format.is_depth_stencil_format() { TextureUsages::empty() } else { TextureUsages::STORAGE_BINDING };
+        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING | stored;
+        let all = gpu.texture("layers", size, format, usage);
         let each = (0..size[2]).map(|base_array_layer| {
             all.create_view(&TextureViewDescriptor {
                 dimension: Some(TextureViewDimension::D2),

@@ -9,7 +9,7 @@ use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
-use crate::lamp_maps::{self, MapLayers, MapPool};
+use crate::layers::{self, LayerKind, Layers};
 use crate::light_cache::{self, Picture};
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
@@ -26,7 +26,7 @@ pub(crate) struct Stages {
     pub pool: BufferPool,
     surfaces: Pool<SurfaceKind, SurfaceViews>,
     accumulations: Accumulations,
-    maps: MapPool,
+    maps: Pool<LayerKind, Layers>,
     pub raster: Raster,
     pub passes: PassCache,
     pub batches: JobLimit,
@@ -37,7 +37,7 @@ pub(crate) struct Stages {
 struct Lendings<'l> {
     planes: &'l Planes,
     mirrored: Option<&'l Reflections>,
-    maps: Option<&'l MapLayers>,
+    maps: Option<&'l Layers>,
 }
 
 impl Stages {
@@ -47,7 +47,7 @@ impl Stages {
             pool: BufferPool::new(gpu),
             surfaces: Pool::of_device(gpu, MOST_FREE_BYTES, SurfaceKind::bytes),
             accumulations: Accumulations::default(),
-            maps: lamp_maps::pool(gpu),
+            maps: layers::pool(gpu),
             raster: Raster::new(gpu, templates),
             passes: PassCache::new(gpu, templates),
             batches: JobLimit::of(BATCHES_OF_A_CLASS),
