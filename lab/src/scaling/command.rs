@@ -13,7 +13,7 @@ use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use scene::SceneSpec;
 
-use super::matrix::Extent;
+use super::matrix::{Extent, Form};
 use super::measure::{Request, take};
 use super::report::{report, show};
 use super::subject::Subject;
@@ -50,6 +50,9 @@ pub struct ScalingArgs {
     /// The most simulated nodes P
     #[arg(long, default_value_t = 1000, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=1000))]
     simulate_to: u16,
+    /// Measure Table 1 alone, in about a quarter of an hour: pipeline and auto at V = 1000 for each of its P
+    #[arg(long = "table-1", conflicts_with = "quick")]
+    table_1: bool,
     #[command(flatten)]
     run: RunArgs,
 }
@@ -59,10 +62,14 @@ const FOLDER: &str = "out/bench-scaling";
 
 impl ScalingArgs {
     fn request(&self, is_lit: bool) -> Request {
-        let [nodes, views] = [usize::from(self.nodes), self.views as usize];
+        let form = match (self.table_1, self.run.quick) {
+            (true, _) => Form::Table1,
+            (false, true) => Form::Quick,
+            (false, false) => Form::Full,
+        };
         Request {
             device: self.run.device.device,
-            extent: Extent { quick: self.run.quick, nodes, views, is_lit },
+            extent: Extent { form, nodes: self.nodes.into(), views: self.views as usize, is_lit },
             quota_cores: self.quota,
             event_log: self.run.folder(FOLDER).join("schedule.log"),
         }

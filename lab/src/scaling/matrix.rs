@@ -20,11 +20,20 @@ const SESSION_S: f64 = 1.0;
 
 use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
 
+/// The points that are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    Full,
+    /// A stated subset.
+    Quick,
+    /// Both policies of Table 1 at each of its numbers of nodes.
+    Table1,
+}
+
 /// The size of the measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// True for a stated subset.
-    pub quick: bool,
+    pub form: Form,
     pub nodes: usize,
     pub views: usize,
     /// Samples hold light.
@@ -34,24 +43,32 @@ pub struct Extent {
 impl Extent {
     /// Whether costs are timed once, before the points of a number of nodes, and not after them or one view at a time.
     pub fn times_once(self) -> bool {
-        self.quick && self.is_lit
+        self.form == Form::Quick && self.is_lit
     }
 
     /// Seconds that sets are counted for, where one set takes less.
     fn counted_s(self) -> f64 {
-        if self.quick { 12.0 } else { 20.0 }
+        if self.form == Form::Full { 20.0 } else { 12.0 }
     }
 
     /// The numbers of nodes P, from the greatest down: nodes are only ever ended.
     pub fn node_counts(self) -> Vec<usize> {
-        let all: &[usize] = if self.quick { &[11, 5] } else { &[11, 10, 9, 8, 7, 6, 5, 4, 3, 2] };
+        let all: &[usize] = match self.form {
+            Form::Full => &[11, 10, 9, 8, 7, 6, 5, 4, 3, 2],
+            Form::Quick => &[11, 5],
+            Form::Table1 => &[11, 10, 9, 8, 7, 6, 5],
+        };
         let smaller = all.iter().copied().filter(|&nodes| nodes < self.nodes);
         [self.nodes].into_iter().chain(smaller).collect()
     }
 
     /// Policies and numbers of views at a number of nodes.
     pub fn points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
-        let all = if self.quick { self.quick_points(nodes) } else { full_points(nodes) };
+        let all = match self.form {
+            Form::Full => full_points(nodes),
+            Form::Quick => self.quick_points(nodes),
+            Form::Table1 => vec![(Pipeline, PAPER_VIEWS), (Auto, PAPER_VIEWS)],
+        };
         all.into_iter().filter(|(_, views)| *views <= self.views).collect()
     }
 
@@ -105,7 +122,7 @@ pub fn planned(
     views: usize,
 ) -> Planned {
     let period_s = predicted_s(costs, images, nodes, policy, views);
-    let most = if extent.quick { 5.0 } else { 8.0 };
+    let most = if extent.form == Form::Full { 8.0 } else { 5.0 };
     let counted_sets = (extent.counted_s() / period_s).ceil().clamp(LEAST_SETS, most) as u32;
     let sampled_s = if policy == Direct { 0.0 } else { costs.sample_image_s * images as f64 };
     // Set 0, the sets that count, and the rest of the next one.
@@ -135,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_quick_form_has_table_1s_ends_and_takes_minutes() {
-        let quick = all(Extent { quick: true, nodes: 11, views: 1000, is_lit: false });
+        let quick = all(Extent { form: Form::Quick, nodes: 11, views: 1000, is_lit: false });
         let has = |policy, nodes, views| {
             quick.iter().any(|p| p.settings.policy == policy && p.nodes == nodes && p.settings.views == views)
         };
@@ -145,15 +162,24 @@ mod tests {
     }
 
     #[test]
+    fn table_1_has_each_number_of_nodes_of_the_papers() {
+        let table = all(Extent { form: Form::Table1, nodes: 11, views: 1000, is_lit: false });
+        for row in super::super::paper::TABLE_1 {
+            let points = table.iter().filter(|point| point.nodes == row.nodes && point.settings.views == PAPER_VIEWS);
+            assert_eq!(points.count(), 2, "{}", row.nodes);
+        }
+    }
+
+    #[test]
     fn the_full_form_has_all_of_table_1() {
-        let full = all(Extent { quick: false, nodes: 11, views: 1000, is_lit: false });
+        let full = all(Extent { form: Form::Full, nodes: 11, views: 1000, is_lit: false });
         for nodes in 2..=11 {
             let views = |policy| {
                 full.iter().any(|p| p.nodes == nodes && p.settings.policy == policy && p.settings.views == 1000)
             };
             assert!([Pipeline, TimeShare, Auto, Direct].into_iter().all(views), "{nodes}");
         }
-        let counts = Extent { quick: false, nodes: 6, views: 1000, is_lit: false }.node_counts();
+        let counts = Extent { form: Form::Full, nodes: 6, views: 1000, is_lit: false }.node_counts();
         assert_eq!(counts, [6, 5, 4, 3, 2], "fewer nodes than the paper's");
     }
 }

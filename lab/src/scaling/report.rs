@@ -21,7 +21,7 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
     report.parameter("lighting", results.lighting.to_string());
     report.parameter("sample images S", results.set.images);
     report.parameter("cores", results.cores);
-    report.parameter("quick", extent.quick);
+    report.parameter("form", format!("{:?}", extent.form));
     report.parameter("nodes P at most", extent.nodes);
     report.parameter("bytes of a sample image", results.traffic.image_bytes);
     report.parameter("bytes of a frame", results.traffic.frame_bytes);
