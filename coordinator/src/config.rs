@@ -58,9 +58,11 @@ pub struct SceneOffer {
     /// A layered depth cube of it, for sessions that are sampled so.
     pub cube: Option<OfferedCube>,
     /// Its mirrors, for sessions that follow mirrors.
-    pub mirrors: Vec<OfferedMirror>,
+    pub mirrors: Vec<OfferedCell>,
     /// A layered depth cube of it, for what the images of a still scene leave unknown.
     pub base: Option<(CommonCell, CubeGrid)>,
+    /// Its blocks, cells of one grid, for sessions that are made from samples alone.
+    pub blocks: Vec<OfferedCell>,
     /// The rig's images get the size that suits the views of a session that names none.
     pub fits_views: bool,
     /// The volume that is reconstructed, unless a session brings its own.
@@ -81,12 +83,12 @@ pub struct SceneOffer {
     pub period_s: Option<f64>,
 }
 
-/// A mirror of a scene.
+/// A mirror or a block of a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OfferedMirror {
+pub struct OfferedCell {
     /// Its box, and how its images are sampled.
     pub cell: CommonCell,
-    /// Sample cameras for what it shows, of sizes in proportion.
+    /// Sample cameras for what a mirror shows, of sizes in proportion; or those of a block.
     pub cameras: Vec<Camera>,
 }
 

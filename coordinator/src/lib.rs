@@ -23,7 +23,7 @@ mod shared;
 mod view_probes;
 mod workload;
 
-pub use config::{CoordinatorConfig, OfferError, OfferedCube, OfferedMirror, SceneOffer, SceneOffers};
+pub use config::{CoordinatorConfig, OfferError, OfferedCell, OfferedCube, SceneOffer, SceneOffers};
 pub use observers::{CoordinatorMetrics, EventLog, Observers};
 pub use plan_store::PlanStore;
 pub use service::serve;

@@ -27,7 +27,7 @@ pub(crate) fn budgeted(
     let rows = rows(request, offer, keeps_cameras.then_some(workload.sample_cameras.len() as u32));
     let first = match workload.sample_cameras.first() {
         _ if !workload.common_cells.is_empty() => {
-            Err("budget: none can be kept for mirrors that show the scene, and beside a base")
+            Err("budget: none can be kept for mirrors that show the scene, and beside a base or blocks")
         }
         _ if workload.samples_cube() => Err("budget: none can be kept for a layered cube"),
         Some(first) if !rows.is_empty() => Ok(first),

@@ -75,6 +75,10 @@ pub(crate) fn workload_of(
         traced_pixel_count: None,
     };
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
+    let blocks = blocks_of(request, offer, &workload)?;
+    if !blocks.is_empty() {
+        return Ok(workload.with_common_cells(blocks));
+    }
     let base = base_of(request, offer, &workload);
     let mirrors = mirrors_of(request, offer, &workload)?;
     Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
@@ -152,6 +156,26 @@ fn base_of(
     }
     let (cell, grid) = offer.base.as_ref()?;
     Some((cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()))
+}
+
+/// The scene's blocks, where the session is made from depth images of the whole scene. Their images are as large as those of view cells.
+fn blocks_of(
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    workload: &Workload,
+) -> Result<Vec<(CommonCell, Vec<SampleCamera>)>, Status> {
+    let Some(first) = workload.sample_cameras.first().and_then(SampleCamera::depth) else { return Ok(Vec::new()) };
+    if request.method == DIRECT || request.volume.is_some() || request.takes_light {
+        return Ok(Vec::new());
+    }
+    let mut blocks = Vec::with_capacity(offer.blocks.len());
+    for block in &offer.blocks {
+        let cameras: Vec<Camera> = block.cameras.iter().map(|camera| camera.resized(first.size_px())).collect();
+        let valid = cameras.iter().try_for_each(Camera::validate);
+        valid.map_err(|error| Status::internal(format!("blocks of scene {}: {error}", offer.name)))?;
+        blocks.push((block.cell.clone(), cameras.into_iter().map(SampleCamera::Depth).collect()));
+    }
+    Ok(blocks)
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.

@@ -24,7 +24,7 @@ pub struct ServingArgs {
     pub(crate) insecure: InsecureArgs,
     /// The budget of sessions that state none: the most error, and the most time of a view, as in "flip 0.05" or "flip p95
     /// 0.06, time 8ms" (see `myriorama plan --help`). The cluster chooses what is sampled, and how views are reconstructed,
-    /// as far as a session does not name it. None is kept with a layered cube as --sampling or --base [default: none]
+    /// as far as a session does not name it. None is kept with a layered cube as --sampling or --base, and with --blocks [default: none]
     #[arg(long, value_name = "BUDGET")]
     budget: Option<Budget>,
     /// The share of a compositor's time that audits of promises may take, from 0 to 0.5: they draw some views directly as well,
@@ -50,7 +50,7 @@ impl ServingArgs {
     /// The scenes, and their offers.
     ///
     /// # Errors
-    /// A scene cannot be used, or the budget cannot be kept for it: it is sampled as a layered cube, or has one beside its samples.
+    /// A scene cannot be used, or the budget cannot be kept for it: it is sampled as a layered cube, or has one or blocks beside its samples.
     pub fn load(&self, scenes: &ScenesArgs) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
         let (scenes, offers) = scenes.load(self.budget.is_some())?;
         let Some(budget) = self.budget else { return Ok((scenes, offers)) };
@@ -58,6 +58,7 @@ impl ServingArgs {
             let cube = match (&offer.cube, &offer.base) {
                 (Some(cube), _) => format!("--sampling {}", cube.sampling),
                 (None, Some((base, _))) => format!("--base {}", base.sampling),
+                (None, None) if !offer.blocks.is_empty() => "--blocks".to_owned(),
                 (None, None) => continue,
             };
             return Err(BadInput(format!("--budget {budget}: none can be kept with {cube}")).into());

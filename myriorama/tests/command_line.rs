@@ -92,6 +92,26 @@ fn the_demo_writes_a_page_whose_checks_hold() {
 }
 
 #[test]
+fn what_cannot_be_sampled_in_blocks_is_named_with_status_2() {
+    let cases: [(&[&str], &str); 6] = [
+        (&["up", "--scene", "courtyard", "--blocks", "0x3"], "--blocks"),
+        (&["up", "--scene", "courtyard", "--blocks", "9x3"], "from 1 to 8"),
+        (&["up", "--scene", "courtyard", "--blocks", "2x2", "--method", "mesh"], "--blocks 2x2: mesh follows no rays"),
+        (
+            &["up", "--scene", "courtyard", "--blocks", "2x2", "--sampling", "layered_cube:64"],
+            "--blocks 2x2: layered_cube:64 takes no images",
+        ),
+        (&["up", "--scene", "courtyard", "--blocks", "2x2", "--budget", "flip 0.1"], "none can be kept with --blocks"),
+        (&["demo", "--scene", "courtyard", "--blocks", "2x2"], "--blocks: this command takes none"),
+    ];
+    for (arguments, named) in cases {
+        let (status, message) = status_and_message(&myriorama(arguments));
+        assert_eq!(status, Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(named), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
 fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
     let fields = "layered_cube:64+light_field:66";
     let cases: [(&[&str], &str); 17] = [

@@ -11,7 +11,7 @@ use cluster::{
     SessionRequest, Timeline,
 };
 use codec::{FrameAssembly, FramePart, WholeFrame};
-use coordinator::{CoordinatorConfig, Observers, OfferedCube, OfferedMirror, SceneOffer, SceneOffers};
+use coordinator::{CoordinatorConfig, Observers, OfferedCell, OfferedCube, SceneOffer, SceneOffers};
 use depth_image::{
     Aabb, Camera, CubeGrid, Environment, LightDirections, LightFieldCamera, PinholeCamera, SourceSpace, ViewPlanes,
 };
@@ -184,6 +184,7 @@ pub fn offer() -> SceneOffer {
         }),
         mirrors: mirrors(),
         base: None,
+        blocks: Vec::new(),
         rows: rows(),
         keeps_cameras: false,
         volume: volume(),
@@ -206,14 +207,14 @@ pub fn offer_with_light_field() -> SceneOffer {
 }
 
 /// Two mirrors, whose images show the ball in their middle.
-fn mirrors() -> Vec<OfferedMirror> {
+fn mirrors() -> Vec<OfferedCell> {
     let mirror = |x_m: f32| {
         let place = Vec3::new(x_m, 0.5, 2.0);
         let towards = Vec3::new(0.0, 0.6, 0.0);
         let camera = PinholeCamera::looking_at(place, towards, Vec3::Y, 0.6, UVec2::splat(16));
         let bounds = Aabb { min: place - 0.1, max: place + 0.1 };
         let cell = CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() };
-        OfferedMirror { cell, cameras: vec![camera.into()] }
+        OfferedCell { cell, cameras: vec![camera.into()] }
     };
     vec![mirror(-1.0), mirror(1.0)]
 }

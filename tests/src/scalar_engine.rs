@@ -524,8 +524,8 @@ impl Engine for ScalarEngine {
     /// a cube.
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
         self.works()?;
-        let (bases, mirrors): (Vec<_>, Vec<_>) =
-            common.into_iter().partition(|(cell, _)| cell.kind == CommonKind::Base);
+        let (bases, others): (Vec<_>, Vec<_>) = common.into_iter().partition(|(cell, _)| cell.kind == CommonKind::Base);
+        let mirrors: Vec<CommonSet> = others.into_iter().filter(|(cell, _)| cell.kind != CommonKind::Block).collect();
         for (_, base) in &bases {
             if !matches!(uploaded(base.as_ref())?.set.images, SampleImages::Cube(..)) {
                 return Err(EngineError::Device("a base without a cube".to_owned()));

@@ -6,8 +6,8 @@ use anyhow::Context as _;
 use clap::builder::{OsStringValueParser, TypedValueParser as _};
 use clap::{Args, Command, FromArgMatches as _};
 use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash};
-use coordinator::{OfferedCube, OfferedMirror, SceneOffer};
-use depth_image::{Camera, CubeGrid, PinholeCamera};
+use coordinator::{OfferedCell, OfferedCube, SceneOffer};
+use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera};
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
@@ -20,7 +20,7 @@ use scene::{
 use crate::camera_file::{self, Placement};
 use crate::delivery::default_method;
 use crate::exit::BadInput;
-use crate::sizes::SampleSize;
+use crate::sizes::{BlockGrid, SampleSize};
 
 /// The size of the sample images, as in the paper.
 const SAMPLE_SIZE_PX: UVec2 = UVec2::new(400, 300);
@@ -64,7 +64,8 @@ pub struct SceneArgs {
     #[arg(long, default_value_t, value_name = "x|y|z")]
     pub up: UpAxis,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, soft N (N rays a light),
-    /// or soft NxN (a grid of N by N rays a light, or, with "by maps" or "by samples", shadow maps of rectangle lights).
+    /// or soft NxN (a grid of N by N rays a light, or, with "by maps" or "by samples", shadow maps of rectangle lights, or,
+    /// with "by cube", walks through a layered cube).
     /// Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that show the
     /// scene: reflections N (mirrors that a ray meets, 1 to 8). Glossy surfaces that show it, in views drawn directly, from a
     /// cube or beside a base: glossy N (rays a pixel, 1 to 256)
@@ -97,6 +98,10 @@ pub struct SceneArgs {
     /// A layered depth cube of the whole scene, layered_cube:SIDE, beside the sample images: what these leave unknown is found in it
     #[arg(long, value_name = "NAME")]
     pub base: Option<SamplingMethod>,
+    /// Blocks of the scene, columns by rows of its ground from 1x1 to 8x8, each with four sample images from above, beside those of
+    /// views: for large terrains. Methods that follow rays alone; mirrors show the environment
+    #[arg(long, value_name = "CxR", conflicts_with = "base")]
+    pub blocks: Option<BlockGrid>,
     /// Images of what each mirror shows, for views from samples in lighting with reflections: pinhole[:N] (1 to 8), or
     /// single_pole[:N], 1 or 2 of the object that the mirror shows largest. Mirrors without images show what --base holds, or
     /// else the environment
@@ -125,8 +130,11 @@ impl Setup {
     /// Checks that samples are depth images alone, which not all commands can do without.
     ///
     /// # Errors
-    /// They are a cube, or have one beside them.
+    /// They are a cube, or have one or blocks beside them.
     pub fn check_depth_images(&self) -> Result<(), BadInput> {
+        if !self.offer.blocks.is_empty() {
+            return Err(BadInput("--blocks: this command takes none, up does".to_owned()));
+        }
         match (&self.offer.cube, &self.offer.base) {
             (Some(cube), _) => Err(BadInput(format!("--sampling {}: this command needs depth images", cube.sampling))),
             (_, Some((base, _))) => {
@@ -138,13 +146,13 @@ impl Setup {
 }
 
 /// The scene's mirrors, as sessions follow them.
-fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<OfferedMirror> {
+fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<OfferedCell> {
     let (mirrors, beyond) = sampling::mirrors(scene, impostors);
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors have no images of what they show");
     }
     let sampling = SamplingMethod::default().to_string();
-    let offered = mirrors.into_iter().map(|mirror| OfferedMirror {
+    let offered = mirrors.into_iter().map(|mirror| OfferedCell {
         cell: CommonCell { kind: CommonKind::Mirrors, bounds: mirror.bounds, sampling: sampling.clone() },
         cameras: mirror.cameras,
     });
@@ -173,7 +181,7 @@ impl SceneArgs {
     /// The method that a coordinator offers: a named one, or one that the samples need. Without one it follows from the light of
     /// views.
     pub(crate) fn offered_method(&self) -> Option<ReconstructionMethod> {
-        let needs_images = self.base.is_some() || !self.sampling().may_hold_light();
+        let needs_images = self.base.is_some() || self.blocks.is_some() || !self.sampling().may_hold_light();
         self.method.or_else(|| needs_images.then(|| self.method()))
     }
 
@@ -202,6 +210,7 @@ impl SceneArgs {
         let samples = self.sampling().cameras(around.clone());
         let cube = self.cube(&scene)?;
         let base = self.base(&scene)?;
+        let blocks = self.blocks_of(&scene)?;
         let package = scene::pack(&scene);
         let offer = SceneOffer {
             // A built-in scene's own name, or a file's without folder and ending.
@@ -211,7 +220,11 @@ impl SceneArgs {
             },
             hash: SceneHash::of(&package),
             package: package.into(),
-            mirrors: if cube.is_some() { Vec::new() } else { mirrors_of(&scene, self.impostors) },
+            mirrors: match cube.is_some() || !blocks.is_empty() {
+                true => Vec::new(),
+                false => mirrors_of(&scene, self.impostors),
+            },
+            blocks,
             cube: cube.map(|grid| OfferedCube {
                 sampling: self.sampling().to_string(),
                 grid,
@@ -260,6 +273,33 @@ impl SceneArgs {
             "a base is a layered cube: see --sampling"
         };
         Err(BadInput(format!("--base {base}: {reason}")).into())
+    }
+
+    /// The scene's blocks with their cameras.
+    fn blocks_of(&self, scene: &Scene) -> anyhow::Result<Vec<OfferedCell>> {
+        let Some(grid) = self.blocks else { return Ok(Vec::new()) };
+        let sampling = self.sampling();
+        let method = self.method();
+        let reason = if sampling.layer_selection().is_some() {
+            format!("{sampling} takes no images of blocks")
+        } else if !method.follows_rays() {
+            format!("{method} follows no rays from block to block")
+        } else {
+            let size_px = self.sample_size.fixed_px().unwrap_or(SAMPLE_SIZE_PX);
+            let offered = self.block_rigs(scene, grid, size_px)?.into_iter().map(|(bounds, rig)| OfferedCell {
+                cell: CommonCell { kind: CommonKind::Block, bounds, sampling: sampling.to_string() },
+                cameras: sampling.cameras(rig.samples(size_px)).into_iter().map(Camera::Pinhole).collect(),
+            });
+            return Ok(offered.collect());
+        };
+        Err(BadInput(format!("--blocks {grid}: {reason}")).into())
+    }
+
+    fn block_rigs(&self, scene: &Scene, grid: BlockGrid, size_px: UVec2) -> anyhow::Result<Vec<(Aabb, Rig)>> {
+        // What moves may come to any height.
+        let still = scene.animation.is_none().then(|| scene.vertices_in_world());
+        let rigs = Rig::of_blocks(&scene.bounds(), grid.0, still.into_iter().flatten(), size_px);
+        rigs.with_context(|| format!("{}: --blocks {grid}", self.scene))
     }
 
     /// The grid of the scene's cube, where that is how it is sampled.
@@ -334,6 +374,11 @@ impl SceneArgs {
 
     fn rig_cameras(&self, scene: &Scene, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
         let bounds = scene.bounds();
+        if let Some(grid) = self.blocks {
+            let blocks = self.block_rigs(scene, grid, size_px)?;
+            let over = Rig::over_blocks(&bounds, &blocks);
+            return Ok(over.with_context(|| format!("{}: no sample cameras", self.scene))?.samples(size_px));
+        }
         let rig = match self.scene {
             // An interior, seen from within.
             SceneSpec::Procedural(_) if !scene.cameras.is_empty() => {

@@ -29,6 +29,26 @@ fn pair(text: &str, most: u32) -> Result<[u32; 2], SizeError> {
         .ok_or_else(|| SizeError { text: text.to_owned(), most })
 }
 
+/// Columns and rows of the blocks of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlockGrid(pub UVec2);
+
+/// The most columns or rows of blocks.
+const MAX_BLOCK_GRID_SIDE: u32 = 8;
+
+impl fmt::Display for BlockGrid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.0.x, self.0.y)
+    }
+}
+
+impl FromStr for BlockGrid {
+    type Err = SizeError;
+    fn from_str(text: &str) -> Result<Self, SizeError> {
+        pair(text, MAX_BLOCK_GRID_SIDE).map(|sides| Self(sides.into()))
+    }
+}
+
 /// The size of sample images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SampleSize {

@@ -325,6 +325,23 @@ fn one_light_field_may_follow_the_cameras_of_a_cube() {
 }
 
 #[test]
+fn blocks_are_alone_and_have_their_own_volume() {
+    let block = |x_m: f32| CommonCell { kind: CommonKind::Block, ..mirror(x_m) };
+    let of = |cells: Vec<CommonCell>| {
+        let common = cells.into_iter().map(|cell| (cell, vec![camera().into(); 4])).collect();
+        workload().with_common_cells(common)
+    };
+    let good = of(vec![block(0.0), block(1.0)]);
+    assert_eq!(good.validate(), Ok(()));
+    let first = good.view_cell_count();
+    assert_eq!(good.of_cell(first + 1).unwrap().volume, block(1.0).bounds);
+    assert_eq!(good.of_cell(0).unwrap().volume, workload().volume);
+    let refused = |workload: Workload| workload.validate().expect_err("refused").to_string();
+    assert!(refused(of(vec![block(0.0), mirror(1.0)])).contains("1 beside 1 of blocks"));
+    assert!(refused(of(vec![block(0.0); 65])).contains("at most 64"));
+}
+
+#[test]
 fn a_base_is_one_cube_beside_the_cells_of_a_still_scene() {
     let grid = CubeGrid::around(&workload().volume, 64).unwrap();
     let cell = CommonCell { kind: CommonKind::Base, ..mirror(0.0) };

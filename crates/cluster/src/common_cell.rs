@@ -4,14 +4,14 @@ use depth_image::{Aabb, CubeGrid, MAX_MIRROR_CELLS, SampleCamera};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty};
-use crate::limits::MAX_TILES;
+use crate::limits::{MAX_BLOCKS, MAX_TILES};
 
 /// A cell that depends on no viewer: every view is made from all of these, and from one view cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CommonCell {
     /// What its images are for.
     pub kind: CommonKind,
-    /// Holds the surfaces of mirrors at all moments; of a base, the scene.
+    /// Holds the surfaces of mirrors at all moments; of a base, the scene. Blocks are cells of one grid.
     pub bounds: Aabb,
     /// How its images are sampled.
     pub sampling: String,
@@ -24,15 +24,29 @@ pub enum CommonKind {
     Mirrors,
     /// They are those of a layered depth cube, in which is walked what other images leave unknown.
     Base,
+    /// They show a block of the scene: rays are searched in the blocks that they cross, front to back, before the images of view cells.
+    Block,
 }
 
 impl CommonCell {
+    /// Whether its images are those of a block.
+    #[must_use]
+    pub fn is_block(&self) -> bool {
+        self.kind == CommonKind::Block
+    }
+
     /// # Errors
-    /// For too many mirrors or bases, and values that no peer may send.
+    /// For too many mirrors, bases or blocks, blocks beside others, and values that no peer may send.
     pub(crate) fn check_all(cells: &[Self]) -> Result<(), InvalidField> {
-        let mirrors = cells.iter().filter(|cell| cell.kind == CommonKind::Mirrors).count();
-        at_most(mirrors, MAX_MIRROR_CELLS, "common_cells of mirrors")?;
-        at_most(cells.len() - mirrors, 1, "common_cells of a base")?;
+        let count = |kind| cells.iter().filter(|cell| cell.kind == kind).count();
+        at_most(count(CommonKind::Mirrors), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
+        at_most(count(CommonKind::Base), 1, "common_cells of a base")?;
+        let blocks = count(CommonKind::Block);
+        at_most(blocks, MAX_BLOCKS, "common_cells of blocks")?;
+        if blocks > 0 && blocks < cells.len() {
+            let given = format!("{} beside {blocks} of blocks", cells.len() - blocks);
+            return Err(InvalidField::out_of_range("common_cells", given, "blocks alone"));
+        }
         for Self { bounds, sampling, .. } in cells {
             nonempty(sampling, "common_cells.sampling_method")?;
             if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {

@@ -4,8 +4,10 @@
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
 /// View cells of one workload.
 pub const MAX_CELLS: usize = 64;
-/// Common cells of one workload: mirrors, and a base.
-pub const MAX_COMMON_CELLS: usize = depth_image::MAX_MIRROR_CELLS + 1;
+/// Blocks of one scene.
+pub const MAX_BLOCKS: usize = 64;
+/// Common cells of one workload: mirrors and a base, or blocks.
+pub const MAX_COMMON_CELLS: usize = MAX_BLOCKS;
 /// Viewpoints of one session.
 pub const MAX_VIEWPOINTS: usize = 256;
 /// Tiles of one sample image.

@@ -140,7 +140,7 @@ impl Workload {
             lighting: self.lighting.clone(),
             // What is found in them needs no planes of its own.
             planes: self.common_cell(cell).map_or(self.planes, |_| SamplePlanes::default()),
-            volume: self.volume,
+            volume: self.common_cell(cell).filter(|common| common.is_block()).map_or(self.volume, |block| block.bounds),
             background: self.background,
             timeline: self.timeline,
             illumination: self.illumination.clone(),

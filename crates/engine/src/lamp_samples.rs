@@ -1,19 +1,22 @@
-//! Sample images of what rectangle lights see, for light of a grid by samples.
+//! Samples of what lamps see, for light of a grid: images from rectangles, or a layered cube of the scene.
 
 use std::collections::VecDeque;
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use depth_image::{Camera, Environment, Illumination, LampRig, PinholeCamera};
+use depth_image::{Camera, CameraError, CubeGrid, CubeImages, Environment, Illumination, LampRig, PinholeCamera};
 use glam::Vec2;
 use gpu::{Frame, Turn};
 use parking_lot::Mutex;
-use reconstruction::{DepthQuads, ReconstructionError, ReconstructionMethod, Reconstructor, SetDescription};
-use render::{DrawWork, GpuScene, GridVisibility, LampMapSource, LampMaps, Lighting, RenderError, Visibility};
+use reconstruction::{DepthQuads, ReconstructionError, ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
+use render::{
+    DrawWork, GpuScene, GridVisibility, LampMapSource, LampMaps, LayerSelection, Lighting, RenderError, Renderer,
+    Visibility,
+};
 use sampling::{SampleWork, Sampler, SamplingError, SamplingMethod};
 
-/// Sides of lamps' images.
+/// Sides of lamps' images, and of the cube.
 const SIDES_PX: std::ops::RangeInclusive<u32> = 64..=4096;
 /// Moments of scenes whose images are kept.
 const MOST_KEPT: usize = 2;
@@ -25,7 +28,7 @@ pub(crate) const MOST_LAMPS: usize = 8;
 pub struct LampSampling {
     /// How samples are taken, from the corners of a lamp or, in layers, from its middle.
     pub sampling: SamplingMethod,
-    /// Width and height of images, and of shadow maps.
+    /// Width and height of images, and of shadow maps; the side of the cube.
     pub side_px: u32,
     /// How quads are cut from samples.
     pub reconstruction: ReconstructionMethod,
@@ -39,8 +42,13 @@ pub struct UnknownLampSampling {
     reason: String,
 }
 
-/// The images of all lamps of a scene at a moment; `None` for lamps that are no rectangles.
-pub(crate) struct LampImages(Vec<Option<DepthQuads>>);
+/// What the lamps of a scene see at a moment.
+pub(crate) enum LampImages {
+    /// The quads of each rectangle's images; `None` for other lamps.
+    Quads(Vec<Option<DepthQuads>>),
+    /// A layered cube of the scene.
+    Cube(SampleSet),
+}
 
 /// The images that were used last, at the end.
 #[derive(Default)]
@@ -56,6 +64,7 @@ struct Moment {
     scene_hash: String,
     scene_time_s: f32,
     sampling: LampSampling,
+    by_cube: bool,
 }
 
 /// The lamps of some work: their images are in use until it is done.
@@ -71,8 +80,12 @@ struct Drawn<'e> {
 
 impl Lamps<'_> {
     pub fn maps(&self) -> LampMaps<'_> {
-        let samples = self.images.as_ref().map(|images| images as &dyn LampMapSource);
-        LampMaps { side_px: self.side_px, samples }
+        let none = LampMaps { side_px: self.side_px, ..LampMaps::default() };
+        let Some(drawn) = &self.images else { return none };
+        match &*drawn.images {
+            LampImages::Quads(_) => LampMaps { samples: Some(drawn), ..none },
+            LampImages::Cube(set) => LampMaps { cube: set.cube_bricks(), ..none },
+        }
     }
 }
 
@@ -84,9 +97,9 @@ impl LampMapSource for Drawn<'_> {
         cameras: &[PinholeCamera],
         reversed_depths: &[wgpu::TextureView],
     ) -> Result<(), RenderError> {
-        let Some(quads) = &self.images.0[lamp] else {
-            return Err(RenderError::LampMaps { reason: format!("lamp {lamp} has no samples") });
-        };
+        let quads = if let LampImages::Quads(quads) = &*self.images { quads[lamp].as_ref() } else { None };
+        let quads =
+            quads.ok_or_else(|| RenderError::LampMaps { reason: format!("lamp {lamp} has no sample images") })?;
         let recorded = self.reconstructor.record_depths(frame, quads, cameras, reversed_depths);
         recorded.map_err(|error| RenderError::LampMaps { reason: error.to_string() })
     }
@@ -101,9 +114,33 @@ pub(crate) struct LampScene<'s> {
     pub turn: Turn,
 }
 
+impl<'s> LampScene<'s> {
+    fn unlit(self) -> DrawWork<'s> {
+        DrawWork {
+            scene_time_s: self.time_s,
+            visibility: Visibility::Triangles,
+            turn: self.turn,
+            ..DrawWork::new(self.scene, Lighting::UNLIT)
+        }
+    }
+
+    /// Of samples that only say where surfaces are.
+    fn description(self, dark: &Illumination) -> SetDescription<'_> {
+        SetDescription {
+            volume: self.scene.bounds_in_world,
+            background: Environment::default(),
+            illumination: dark,
+            highlight: None,
+            environment: None,
+            mips: false,
+        }
+    }
+}
+
 /// What samples lamps, and cuts their samples into quads.
 #[derive(Clone, Copy)]
 pub(crate) struct LampPipelines<'e> {
+    pub renderer: &'e Renderer,
     pub sampler: &'e Sampler,
     pub reconstructor: &'e Reconstructor,
 }
@@ -112,12 +149,25 @@ pub(crate) struct LampPipelines<'e> {
 pub(crate) enum LampError {
     NoRectangle,
     Rectangles { count: usize },
+    Bounds(CameraError),
+    Render(RenderError),
     Sampling(SamplingError),
     Reconstruction(ReconstructionError),
 }
 
 impl<'e> LampPipelines<'e> {
-    fn sample(self, of: LampScene<'_>, sampling: LampSampling) -> Result<LampImages, LampError> {
+    fn sample(self, of: LampScene<'_>, moment: &Moment) -> Result<LampImages, LampError> {
+        match moment.by_cube {
+            true => self.sample_cube(of, moment.sampling.side_px).map(LampImages::Cube),
+            false => self.sample_rectangles(of, moment.sampling).map(LampImages::Quads),
+        }
+    }
+
+    fn sample_rectangles(
+        self,
+        of: LampScene<'_>,
+        sampling: LampSampling,
+    ) -> Result<Vec<Option<DepthQuads>>, LampError> {
         let rigs = of.scene.lamp_rigs(sampling.side_px);
         match rigs.iter().flatten().count() {
             0 => return Err(LampError::NoRectangle),
@@ -125,7 +175,20 @@ impl<'e> LampPipelines<'e> {
             _ => {}
         }
         let images = rigs.iter().map(|rig| rig.as_ref().map(|rig| self.sample_lamp(rig, of, sampling)).transpose());
-        Ok(LampImages(images.collect::<Result<_, _>>()?))
+        images.collect()
+    }
+
+    /// Every surface of the scene, on lines along three axes.
+    fn sample_cube(self, of: LampScene<'_>, side: u32) -> Result<SampleSet, LampError> {
+        let grid = CubeGrid::around(&of.scene.bounds_in_world, side).map_err(LampError::Bounds)?;
+        let drawn = grid.cameras().map(|camera| {
+            let kept = LayerSelection::Dominant;
+            self.renderer.draw_layers(of.unlit(), &camera, kept).map_err(LampError::Render)
+        });
+        let [x, y, z] = drawn;
+        let cube = CubeImages { grid, images: [x?, y?, z?], light_field: None };
+        let set = self.reconstructor.upload_cube(&cube, &of.description(&Illumination::default()), of.turn);
+        set.map_err(LampError::Reconstruction)
     }
 
     fn sample_lamp(self, rig: &LampRig, of: LampScene<'_>, sampling: LampSampling) -> Result<DepthQuads, LampError> {
@@ -136,13 +199,7 @@ impl<'e> LampPipelines<'e> {
         };
         let cameras: Vec<Camera> = cameras.into_iter().map(Camera::Pinhole).collect();
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-        let draw = DrawWork {
-            scene_time_s: of.time_s,
-            visibility: Visibility::Triangles,
-            turn: of.turn,
-            both_faces: true,
-            ..DrawWork::new(of.scene, Lighting::UNLIT)
-        };
+        let draw = DrawWork { both_faces: true, ..of.unlit() };
         let corners = sampling.reconstruction.needs_corners();
         let work = SampleWork {
             draw,
@@ -153,15 +210,10 @@ impl<'e> LampPipelines<'e> {
             planes: render::SamplePlanes { normal: true, corners, ..Default::default() },
         };
         let images = self.sampler.sample(&work).map_err(LampError::Sampling)?;
-        let description = SetDescription {
-            volume: of.scene.bounds_in_world,
-            background: Environment::default(),
-            illumination: &Illumination::default(),
-            highlight: None,
-            environment: None,
-            mips: false,
-        };
-        let set = self.reconstructor.upload(&images, &description, of.turn).map_err(LampError::Reconstruction)?;
+        let set = self
+            .reconstructor
+            .upload(&images, &of.description(&Illumination::default()), of.turn)
+            .map_err(LampError::Reconstruction)?;
         let quads = self.reconstructor.depth_quads(Arc::new(set), sampling.reconstruction, of.turn);
         quads.map_err(LampError::Reconstruction)
     }
@@ -177,10 +229,12 @@ impl LampSamples {
     ) -> Result<Lamps<'e>, LampError> {
         let sampling = *self.sampling.lock();
         let side_px = sampling.side_px;
-        if lighting.grid_maps() != Some(GridVisibility::Samples) {
-            return Ok(Lamps { side_px, images: None });
-        }
-        let moment = Moment { scene_hash: of.hash.to_owned(), scene_time_s: of.time_s, sampling };
+        let by_cube = match lighting.grid_visibility() {
+            GridVisibility::Rays | GridVisibility::Maps => return Ok(Lamps { side_px, images: None }),
+            GridVisibility::Samples => false,
+            GridVisibility::Cube => true,
+        };
+        let moment = Moment { scene_hash: of.hash.to_owned(), scene_time_s: of.time_s, sampling, by_cube };
         let images = match self.find(&moment) {
             Some(images) => images,
             None => self.made(pipelines, of, moment)?,
@@ -199,7 +253,7 @@ impl LampSamples {
         if let Some(images) = self.find(&moment) {
             return Ok(images);
         }
-        let images = Arc::new(pipelines.sample(of, moment.sampling)?);
+        let images = Arc::new(pipelines.sample(of, &moment)?);
         self.keep(moment, images.clone());
         Ok(images)
     }

@@ -79,6 +79,8 @@ struct UploadedImages {
     mirrors: Vec<(Aabb, Arc<reconstruction::SampleSet>)>,
     /// What tells where its images leave anything unknown.
     base: Option<Arc<reconstruction::SampleSet>>,
+    /// What comes before its images.
+    blocks: Vec<Arc<reconstruction::SampleSet>>,
 }
 
 impl UploadedSet for UploadedImages {}
@@ -87,7 +89,8 @@ impl UploadedSet for UploadedLight {}
 /// The images of a set; fails for samples of light, and for a set of another device.
 fn images(set: &dyn UploadedSet) -> Result<&UploadedImages, EngineError> {
     if (set as &dyn Any).is::<UploadedLight>() {
-        let reason = "views that take light from samples have neither mirror cells nor a base; leave out --base";
+        let reason =
+            "views that take light from samples have no mirror cells, base or blocks; leave out --base and --blocks";
         return Err(invalid("common_cells", reason));
     }
     (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))
@@ -163,7 +166,8 @@ impl GpuEngine {
 
     /// The lamps for a light: those of others than by samples have no images.
     fn lamps(&self, of: LampScene<'_>, lighting: Lighting) -> Result<Lamps<'_>, EngineError> {
-        let pipelines = LampPipelines { sampler: &self.sampler, reconstructor: &self.reconstructor };
+        let pipelines =
+            LampPipelines { renderer: &self.renderer, sampler: &self.sampler, reconstructor: &self.reconstructor };
         self.catching(|| self.lamp_samples.lamps(pipelines, of, lighting))
     }
 
@@ -408,6 +412,7 @@ impl Engine for GpuEngine {
             glossy_rays: lighting.glossy_rays(),
             mirrors: Vec::new(),
             base: None,
+            blocks: Vec::new(),
         }))
     }
 
@@ -415,14 +420,16 @@ impl Engine for GpuEngine {
         let &UploadedImages { ref set, reflections, glossy_rays, .. } = images(set.as_ref())?;
         let mut mirrors = Vec::new();
         let mut base = None;
+        let mut blocks = Vec::new();
         for (cell, common) in common {
             let common = images(common.as_ref())?.set.clone();
             match cell.kind {
                 CommonKind::Mirrors => mirrors.push((cell.bounds, common)),
                 CommonKind::Base => base = Some(common),
+                CommonKind::Block => blocks.push(common),
             }
         }
-        Ok(Arc::new(UploadedImages { set: set.clone(), reflections, glossy_rays, mirrors, base }))
+        Ok(Arc::new(UploadedImages { set: set.clone(), reflections, glossy_rays, mirrors, base, blocks }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
@@ -430,11 +437,12 @@ impl Engine for GpuEngine {
         if let Some(light) = (set as &dyn Any).downcast_ref() {
             return self.draw_cached(light, method, work, turn);
         }
-        let UploadedImages { set, reflections, glossy_rays, mirrors, base } = images(set)?;
+        let UploadedImages { set, reflections, glossy_rays, mirrors, base, blocks } = images(set)?;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
         let cells: Vec<MirrorCell<'_>> = cells.collect();
         let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy_rays: *glossy_rays };
-        let common = CommonSets { mirrors, base: base.as_deref() };
+        let blocks: Vec<&reconstruction::SampleSet> = blocks.iter().map(Arc::as_ref).collect();
+        let common = CommonSets { mirrors, base: base.as_deref(), blocks: &blocks };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let request = ReconstructRequest::new(set, cameras, method);
             let request = ReconstructRequest { common, turn, planes: work.planes, ..request };
@@ -542,6 +550,7 @@ impl From<ReconstructionError> for Caught {
             Error::Camera { .. } => "camera",
             Error::Volume => "volume",
             Error::NoSamples { .. } | Error::NoScene { .. } => "reconstruction_method",
+            Error::Blocks { .. } => "common_cells of blocks",
             Error::MirrorCells(_) => "common_cells of mirrors",
             Error::Reflections(_) => "reflections",
             Error::Sample { .. }
@@ -566,6 +575,8 @@ impl From<LampError> for Caught {
                 );
                 Self(invalid("lighting", reason))
             }
+            LampError::Bounds(error) => Self(invalid("lighting", format!("the scene has no layered cube: {error}"))),
+            LampError::Render(error) => error.into(),
             LampError::Sampling(error) => error.into(),
             LampError::Reconstruction(error) => error.into(),
         }

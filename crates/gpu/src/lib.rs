@@ -7,6 +7,7 @@
 //! the switches of one shader, and a [`PassCache`] its pipelines. Resources are bound to a shader's variables by name.
 
 mod catching;
+pub mod cube_walk;
 mod device;
 mod environment;
 mod error;

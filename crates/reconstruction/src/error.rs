@@ -45,6 +45,9 @@ pub enum ReconstructionError {
     /// The method takes surfaces from the scene, which this crate does not have.
     #[error("{method} takes surfaces from the scene, and cannot be reconstructed from samples alone")]
     NoScene { method: String },
+    /// Views from the blocks of a scene are searched along rays, in images alone.
+    #[error("views from blocks of a scene follow rays in images alone, without {what}")]
+    Blocks { what: String },
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

@@ -3,10 +3,11 @@
 use std::{collections::BTreeSet, mem::offset_of, sync::OnceLock};
 
 use bytemuck::Zeroable as _;
+use gpu::cube_walk::GpuCube;
 use gpu::{GpuTone, ShaderSource};
 use naga::{Module, TypeInner};
 
-use crate::cube::{GpuCube, GpuLightField};
+use crate::cube::GpuLightField;
 use crate::{
     bounce::{GpuGlossySurface, GpuMirrorBox, GpuMirroredRay},
     lobes::GpuLobeRays,

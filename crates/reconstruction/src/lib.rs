@@ -3,9 +3,10 @@
 //! [`Reconstructor::upload`] puts one complete sample set on the device with a min-max pyramid a camera.
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, then the method, the fill and
 //! highlights for each position within the pixels, and their mean. [`CommonSets`] are further sets, in which rays off mirrors are followed,
-//! and pixels that images leave unknown. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
+//! and pixels that images leave unknown; or those of the blocks of a scene. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
 mod antialias;
+mod blocks;
 mod bounce;
 mod cube;
 mod device;

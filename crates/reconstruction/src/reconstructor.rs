@@ -8,6 +8,7 @@ use glam::Vec2;
 use gpu::{BufferPool, Frame, Gpu, JobLimit, PassCache, Submitted, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
+use crate::blocks::BlockVisits;
 use crate::bounce::{self, Bounces, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
 use crate::in_flight::{BatchViews, submit};
@@ -46,11 +47,14 @@ pub struct CommonSets<'s> {
     /// A layered cube of the whole scene, in which is walked what the view's images, or those of a mirror cell, leave unknown, and what
     /// rough surfaces and mirrors in no mirror cell show.
     pub base: Option<&'s SampleSet>,
+    /// The blocks of a scene, cells of one grid, each with images of its own: rays visit them front to back, before the view's own images.
+    /// They take neither mirror cells nor a base, and are for methods that follow rays.
+    pub blocks: &'s [&'s SampleSet],
 }
 
 impl<'s> From<Mirrors<'s>> for CommonSets<'s> {
     fn from(mirrors: Mirrors<'s>) -> Self {
-        Self { mirrors, base: None }
+        Self { mirrors, ..Self::default() }
     }
 }
 
@@ -142,11 +146,13 @@ impl Reconstructor {
     /// A camera that is not valid (all are checked first), a set without the samples that the method needs, too many mirror
     /// cells, a cell without depth images, a base without a cube, or the device.
     pub fn reconstruct(&self, request: ReconstructRequest<'_>) -> Result<Vec<View>, ReconstructionError> {
-        let ReconstructRequest { set, common: CommonSets { mirrors, base }, cameras, method, turn, .. } = request;
+        let ReconstructRequest { set, common, cameras, method, turn, .. } = request;
+        let CommonSets { mirrors, base, blocks } = common;
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
         check_samples(set, method)?;
+        check_blocks(common, method)?;
         // All mirrors of a cube show the cube, whatever cells there are.
         let (mirrors, cube, base) = match method.walks_cube() {
             true => (Mirrors { cells: &[], ..mirrors }, Some(set), None),
@@ -168,7 +174,7 @@ impl Reconstructor {
         let mut views = Vec::with_capacity(cameras.len());
         let mut in_flight: Option<(Submitted<'_>, BatchViews)> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras, most_pixels).map(Some).chain([None]) {
+        for batch in batches(cameras, most_pixels, blocks).map(Some).chain([None]) {
             let recording = batch.map(|batch| self.record(prepared, batch)).transpose()?;
             // Whoever holds the device asks for no other turn.
             let done = match in_flight.take() {
@@ -189,16 +195,19 @@ impl Reconstructor {
         prepared: Prepared<'r>,
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let Prepared { request: ReconstructRequest { set, method, planes, turn, .. }, followed, .. } = prepared;
-        let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), followed[0].cells.len()));
+        let Prepared { request: ReconstructRequest { set, common, method, planes, turn, .. }, followed, .. } = prepared;
+        let cells = followed[0].cells.len() + common.blocks.len();
+        let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), cells));
         let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
+        recording.blocks = BlockVisits::lend(&self.device, common.blocks, &cameras[0], recording.batch.plane_bytes);
         let rays = recording.batch.plane_bytes as usize / 4;
         let [mirrors, lobes] =
             followed.map(|mirrors| Bounces::lend(&self.device, mirrors, rays, CurvedSearch::default()));
         let bounces = [mirrors?, lobes?];
         let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
         self.record_positions(prepared, &mut recording)?;
-        recording.batch.bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory).collect();
+        let visits = recording.blocks.take().into_iter().flat_map(BlockVisits::into_memory);
+        recording.batch.lent = bounces.into_iter().flatten().flat_map(Bounces::into_memory).chain(visits).collect();
         Ok(recording)
     }
 
@@ -209,8 +218,8 @@ impl Reconstructor {
         recording: &mut Recording<'_>,
     ) -> Result<(), ReconstructionError> {
         let ReconstructRequest { method, planes, .. } = prepared.request;
-        // What a tile's start proves holds for every position within its pixels.
-        if method.follows_rays() {
+        // What a tile's start proves holds for every position within its pixels. Each block has starts of its own.
+        if method.follows_rays() && recording.blocks.is_none() {
             tile_start::record(recording)?;
         }
         if planes.antialias == Antialias::NONE {
@@ -236,7 +245,8 @@ impl Reconstructor {
         self.record_position(prepared, recording, None)?;
         // What a mirror shows is not shared.
         let is_shared = prepared.bounces.iter().all(Option::is_none);
-        let rough = if is_shared { request.method.share_positions(recording)? } else { None };
+        let rough =
+            if is_shared && recording.blocks.is_none() { request.method.share_positions(recording)? } else { None };
         if rough.is_none() {
             antialias::record(recording, Sums::Begun, None)?;
         }
@@ -257,6 +267,8 @@ impl Reconstructor {
     ) -> Result<(), ReconstructionError> {
         let Prepared { request: ReconstructRequest { method, .. }, base, mesh, bounces: [bounces, lobes], .. } =
             prepared;
+        let unknown_in_blocks = BlockVisits::record(recording, &self.drawing, method)?;
+        let listed = unknown_in_blocks.as_ref().or(listed);
         let unknown = method.record(&self.drawing, mesh, recording, listed, bounces)?;
         if method.walks_cube() {
             return fill::record(recording, &unknown);
@@ -362,6 +374,22 @@ fn record_mirrored(
 
 fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {
     base.cube.as_deref().ok_or(ReconstructionError::NoSamples { what: "a base".to_owned(), needed: "a layered cube" })
+}
+
+fn check_blocks(common: CommonSets<'_>, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
+    if common.blocks.is_empty() {
+        return Ok(());
+    }
+    let refused = if !method.follows_rays() {
+        method.to_string()
+    } else if common.base.is_some() {
+        "a base".to_owned()
+    } else if !common.mirrors.cells.is_empty() {
+        "mirror cells".to_owned()
+    } else {
+        return common.blocks.iter().try_for_each(|block| check_samples(block, method));
+    };
+    Err(ReconstructionError::Blocks { what: refused })
 }
 
 /// Views come from pinholes or from a cube, as the method needs.

@@ -13,11 +13,12 @@ use gpu::{
 };
 use wgpu::BufferUsages;
 
+use crate::blocks::{BlockVisits, front_to_back};
 use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, TILE_PX};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{quads::QuadTargets, sample_set::SampleSet};
 
-/// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, up to 12 on the host.
+/// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, 8 more with blocks, up to 12 on the host.
 pub(crate) const PIXELS_A_BATCH: usize = 1 << 20;
 /// The same where rays off mirrors are followed: they take 108 bytes a pixel, and 16 more for each mirror cell and for a base. Rays into
 /// lobes that are walked in a base take as much again, and 76 more for their surfaces.
@@ -32,6 +33,8 @@ const UNKNOWN_SLICE_PX: u64 = 1 << 14;
 pub(crate) struct Recording<'r> {
     pub device: &'r Device,
     pub set: &'r SampleSet,
+    /// What comes before the set, where the scene has blocks.
+    pub blocks: Option<BlockVisits<'r>>,
     pub frame: Frame<'r>,
     pub batch: Batch,
     /// The family of the passes, whose costs are learned.
@@ -83,8 +86,8 @@ pub(crate) struct Batch {
     rough_pixels: Option<PooledBuffer>,
     /// For methods that draw; all positions are drawn into the same.
     pub targets: Option<QuadTargets>,
-    /// The memory of mirrored rays, lent until the device is done with the batch.
-    pub bounces: Vec<PooledBuffer>,
+    /// The memory of mirrored rays and of blocks, lent until the device is done with the batch.
+    pub lent: Vec<PooledBuffer>,
 }
 
 impl<'r> Recording<'r> {
@@ -125,10 +128,10 @@ impl<'r> Recording<'r> {
             lists_made: 0,
             rough_pixels: has_sums.then(|| device.buffers.lend_storage("pixels of further positions", plane_bytes)),
             targets: None,
-            bounces: Vec::new(),
+            lent: Vec::new(),
         };
         let frame = Frame::begin(&device.gpu, "reconstruct", turn);
-        Ok(Self { device, set, frame, batch, family })
+        Ok(Self { device, set, blocks: None, frame, batch, family })
     }
 
     /// Records what follows for another position within the pixels.
@@ -137,6 +140,13 @@ impl<'r> Recording<'r> {
         let cameras: Vec<_> = centers.iter().map(|camera| camera.with_offset(offset_px)).collect();
         self.batch.works = works(self.device, self.set, &cameras, pieces, *planes);
         self.batch.cameras = cameras;
+    }
+
+    /// Records what follows for another set's images.
+    pub fn enter(&mut self, set: &'r SampleSet) {
+        let Batch { cameras, pieces, planes, .. } = &self.batch;
+        self.batch.works = works(self.device, set, cameras, pieces, *planes);
+        self.set = set;
     }
 
     /// A list for the pixels that a pass leaves undecided; it is good until the list after the next is begun.
@@ -270,9 +280,16 @@ impl Pieces {
     }
 }
 
-/// Runs of views of one size, bounded in pixels.
-pub(crate) fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Iterator<Item = &[PinholeCamera]> {
-    cameras.chunk_by(|a, b| a.size_px == b.size_px).flat_map(move |run| {
+/// Runs of views of one size, bounded in pixels, which see all blocks in one order.
+pub(crate) fn batches<'c>(
+    cameras: &'c [PinholeCamera],
+    most_pixels: usize,
+    blocks: &[&SampleSet],
+) -> impl Iterator<Item = &'c [PinholeCamera]> {
+    let is_alike = |a: &PinholeCamera, b: &PinholeCamera| {
+        a.size_px == b.size_px && front_to_back(blocks, a) == front_to_back(blocks, b)
+    };
+    cameras.chunk_by(is_alike).flat_map(move |run| {
         let views = (most_pixels / run[0].pixel_count()).clamp(1, MAX_VIEWS_A_BATCH);
         run.chunks(views)
     })

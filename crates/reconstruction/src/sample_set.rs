@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
 use depth_image::{Aabb, DepthImage, PinholeCamera};
-use glam::{UVec2, Vec2};
+use glam::{UVec2, Vec2, Vec3};
+use gpu::cube_walk::CubeBricks;
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureFormat};
@@ -48,6 +49,18 @@ impl SampleSet {
     /// The switches of all shaders that read the set.
     pub(crate) fn variant(&self) -> SetVariant {
         SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
+    }
+
+    /// What rays are walked through in a layered cube; `None` for images.
+    #[must_use]
+    pub fn cube_bricks(&self) -> Option<&CubeBricks> {
+        self.cube.as_ref().map(|cube| &cube.bricks)
+    }
+
+    /// The squared distance of a place from the volume that is searched.
+    pub(crate) fn distance_squared_m2(&self, place_in_world: Vec3) -> f32 {
+        let [min, max] = [self.volume.min_in_world, self.volume.max_in_world].map(Vec3::from);
+        place_in_world.distance_squared(place_in_world.clamp(min, max))
     }
 
     /// The tables of its images, and what these reflect.

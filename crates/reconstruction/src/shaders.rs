@@ -5,14 +5,12 @@ use gpu::{ShaderError, ShaderSource, Templates, wgsl_constants, wgsl_files};
 use minijinja::Value;
 
 use crate::antialias::Shown;
+use crate::blocks::ListRays;
 use crate::bounce::{
     BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, Land, MARCH_ROUNDS,
     MAX_WALK_STEPS, START_FOOTPRINTS,
 };
-use crate::cube::{
-    ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, FOOTPRINT_SHARE, HIT_SLACK, LEAST_LOBE_SHARE, MAX_CUBE_STEPS, MORE_ENTRIES,
-    MOST_MASKING, SQUARE_REACH, WALK_NUDGE,
-};
+use crate::cube::{FOOTPRINT_SHARE, LEAST_LOBE_SHARE, MOST_MASKING};
 use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
 use crate::lobes::{Lobe, LobeSum};
 use crate::methods::hybrid_mesh::{CutTexels, GREATEST_SLOPE};
@@ -33,7 +31,7 @@ use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
 const SHADERS: [(&str, &str); 31] = wgsl_files! {
-    "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "found.wgsl", "cube/walk.wgsl", "cube/colors.wgsl", "cube/gather.wgsl", "pixel_list.wgsl", "at_pixel.wgsl",
+    "antialias.wgsl", "blocks.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "found.wgsl", "cube/colors.wgsl", "cube/gather.wgsl", "pixel_list.wgsl", "at_pixel.wgsl",
     "reflection.wgsl", "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/list.wgsl", "bounce/glossy.wgsl", "bounce/list_glossy.wgsl", "bounce/lobe.wgsl", "bounce/lobe_rays.wgsl", "bounce/lobe_sum.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
@@ -57,7 +55,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
     let constants = wgsl_constants! {
         ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, BOUNCE_LEVEL, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FIRST_SAMPLE, FLAT_FOOTPRINTS,
         GREATEST_TILE_MOVE, HALF_CODE, HALF_DIAGONAL, HIDDEN_WEIGHT, HOLE_CODE, LEAST_SHARE, LEAST_TILE_MOVE,
-        ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, FOOTPRINT_SHARE, HIT_SLACK, LEAST_LOBE_SHARE, MORE_ENTRIES, MOST_MASKING, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE,
+        FOOTPRINT_SHARE, LEAST_LOBE_SHARE, MOST_MASKING,
         LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_BASE, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_GUESSED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
         EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, MARCH_ROUNDS, MAX_WALK_STEPS, SLOPE_SHARE, SPLIT_SHIFT, START_FOOTPRINTS, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE,
         BISECTIONS, BLIND_MOVE, CHUNK, EYE_SHARE, FAINT_HIGHLIGHT, GREATEST_SLOPE, INDICES_A_QUAD, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES,
@@ -73,6 +71,7 @@ pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<Shad
         templates,
         TileStart,
         Fill,
+        ListRays,
         Specular,
         BounceMarch,
         CurvedWalk,

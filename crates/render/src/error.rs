@@ -14,8 +14,8 @@ pub enum RenderError {
     /// Some pictures are taken by pinholes alone.
     #[error("camera {index} is a {model}, must be a pinhole for {what}")]
     Model { index: usize, model: &'static str, what: &'static str },
-    /// Light by samples needs samples of what its lamps see.
-    #[error("lighting {lighting} needs sample images of what its rectangle lights see, and there are none")]
+    /// Light by samples needs images of what its lamps see; light by cube, the cube.
+    #[error("lighting {lighting} needs samples of what its lamps see, and there are none")]
     LampSamples { lighting: String },
     /// Shadow maps cannot be drawn from samples.
     #[error("shadow maps of a lamp: {reason}")]

@@ -7,7 +7,7 @@ use wgpu::Buffer;
 
 use crate::rays::Traversal;
 use crate::{
-    Direct, RenderError,
+    Direct, GridVisibility, RenderError,
     batch::{Batch, Part, Recording},
     pixel_list::PixelList,
     reflections::bounces::Rays,
@@ -106,7 +106,7 @@ impl Illuminate {
             shadows: lighting.shadow_rays() > 0,
             soft: matches!(lighting.direct, Direct::Soft(_) | Direct::Grid(..)),
             grid: lighting.grid_side() > 0,
-            bits: lighting.grid_maps().is_some(),
+            bits: lighting.grid_visibility() != GridVisibility::Rays,
             ambient: lighting.ambient.is_some(),
             indirect: lighting.is_indirect(),
             sums: batch.output.sums,

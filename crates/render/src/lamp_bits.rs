@@ -5,6 +5,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use depth_image::{LampRig, PinholeCamera};
 use glam::Vec3;
+use gpu::cube_walk::CubeBricks;
 use gpu::{Binding, BufferPool, Gpu, Lent, Pool, PooledBuffer, ShaderVariant, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::BufferUsages;
@@ -26,6 +27,8 @@ pub(crate) struct LampBits {
     single_pole: bool,
     /// Shadow maps are read first.
     pub maps: bool,
+    /// A layered cube is walked first.
+    pub cube: bool,
     environment_map: bool,
     light_count: usize,
     traversal: Traversal,
@@ -58,32 +61,33 @@ impl ShaderVariant for LampBits {
     const TEMPLATE: &'static str = "lamp_bits.wgsl";
 
     fn context(&self) -> Value {
-        let Self { by_rays, single_pole, maps, environment_map, light_count, traversal } = *self;
-        let own = context! { light_slots => gpu::light_slots(light_count), by_rays, single_pole, maps, environment_map, bits => true, writes_bits => true, primary => false, from_eye => false };
+        let Self { by_rays, single_pole, maps, cube, environment_map, light_count, traversal } = *self;
+        let own = context! { light_slots => gpu::light_slots(light_count), by_rays, single_pole, maps, cube, environment_map, meets_both_sides => true, bits => true, writes_bits => true, primary => false, from_eye => false };
         merge_maps([own, traversal.context()])
     }
 
     fn all() -> Vec<Self> {
-        let all = switches().flat_map(|[by_rays, single_pole, maps, environment_map]| {
+        let all = switches().flat_map(|[by_rays, single_pole, maps, cube, environment_map]| {
             Traversal::ALL.map(|traversal| Self {
                 by_rays,
                 single_pole,
                 maps,
+                cube,
                 environment_map,
                 light_count: 1,
                 traversal,
             })
         });
-        // Rays around a pole find surfaces.
-        let all = all.filter(|variant| variant.by_rays || !variant.single_pole);
+        // Rays around a pole find surfaces; a grid is asked in one way.
+        let all = all.filter(|variant| (variant.by_rays || !variant.single_pole) && !(variant.maps && variant.cube));
         all.collect()
     }
 }
 
-/// Memory for the bits of a batch; `None` for light without a grid that is asked of maps, unless bits are wanted themselves.
+/// Memory for the bits of a batch; `None` for light without a grid, or by rays, unless bits are wanted themselves.
 pub(crate) fn lend(pool: &BufferPool, batch: &Batch<'_>) -> Option<PooledBuffer> {
     let work = batch.work;
-    let is_used = work.lighting.grid_maps().is_some() || batch.output.lamp_bits;
+    let is_used = work.lighting.grid_visibility() != GridVisibility::Rays || batch.output.lamp_bits;
     let bytes = batch.bytes(batch.lamp_words());
     (is_used && bytes > 0).then(|| pool.lend_storage("which places of lamps pixels see", bytes))
 }
@@ -95,7 +99,7 @@ pub(crate) fn lend_maps(
     batch: &Batch<'_>,
 ) -> Option<Lent<LayerKind, Layers>> {
     let kind = lamp_maps::kind(batch.work.lamp_maps.side_px);
-    let is_used = batch.work.lighting.grid_maps().is_some();
+    let is_used = batch.work.lighting.grid_visibility().has_maps();
     is_used.then(|| pool.lend(kind, |&(size, format)| Layers::new(gpu, size, format)))
 }
 
@@ -110,6 +114,9 @@ pub(crate) fn record(
         return Ok(());
     }
     let work = recording.batch.work;
+    let visibility = work.lighting.grid_visibility();
+    let cube = work.lamp_maps.cube.filter(|_| visibility == GridVisibility::Cube);
+    let without_maps = cube.map_or(Answer::Rays, Answer::Cube);
     let rays = recording.sums.rays[0].clone();
     for (lamp, rig) in work.scene.lamp_rigs(work.lamp_maps.side_px).into_iter().enumerate() {
         let mapped = rig.zip(layers);
@@ -117,32 +124,44 @@ pub(crate) fn record(
         for first in rays.clone().step_by(at_once as usize) {
             let chunk = first..(first + at_once).min(rays.end);
             let Some((rig, layers)) = mapped else {
-                find(recording, surfaces, lamp, chunk, None)?;
+                find(recording, surfaces, lamp, chunk, without_maps)?;
                 continue;
             };
             let cameras = cameras_of(recording.batch, &rig, chunk.clone());
-            match work.lamp_maps.samples.filter(|_| work.lighting.grid_maps() == Some(GridVisibility::Samples)) {
+            match work.lamp_maps.samples.filter(|_| visibility == GridVisibility::Samples) {
                 Some(samples) => samples.record(&mut recording.frame, lamp, &cameras, &layers.each)?,
                 None => raster.record_maps(&mut recording.frame, &work, &cameras, &layers.each)?,
             }
             let uniform = GpuLampMaps::new(&cameras);
             let uniform = recording.gpu.buffer_with("cameras on a lamp", &[uniform], BufferUsages::UNIFORM);
             let maps = layers.first(layers.each.len());
-            find(recording, surfaces, lamp, chunk, Some(DrawnMaps { uniform: &uniform, maps: &maps }))?;
+            find(recording, surfaces, lamp, chunk, Answer::Maps { uniform: &uniform, maps: &maps })?;
         }
     }
     Ok(())
 }
 
-/// Maps, and the uniform of their cameras.
-struct DrawnMaps<'m> {
-    uniform: &'m wgpu::Buffer,
-    maps: &'m wgpu::TextureView,
+/// What is asked before rays.
+#[derive(Clone, Copy)]
+enum Answer<'m> {
+    Rays,
+    /// Maps, and the uniform of their cameras.
+    Maps {
+        uniform: &'m wgpu::Buffer,
+        maps: &'m wgpu::TextureView,
+    },
+    Cube(&'m CubeBricks),
 }
 
-impl DrawnMaps<'_> {
-    fn bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::buffer("lamp_maps", self.uniform), Binding::texture("maps", self.maps)]
+impl<'m> Answer<'m> {
+    fn bindings(self) -> Vec<Binding<'m>> {
+        match self {
+            Self::Rays => Vec::new(),
+            Self::Maps { uniform, maps } => {
+                vec![Binding::buffer("lamp_maps", uniform), Binding::texture("maps", maps)]
+            }
+            Self::Cube(cube) => cube.bindings().collect(),
+        }
     }
 }
 
@@ -159,14 +178,15 @@ fn find(
     surfaces: &[Surfaces],
     lamp: usize,
     rays: Range<u32>,
-    maps: Option<DrawnMaps<'_>>,
+    answer: Answer<'_>,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
     let variant = LampBits {
         by_rays: batch.by_rays,
         single_pole: batch.is_single_pole(),
-        maps: maps.is_some(),
+        maps: matches!(answer, Answer::Maps { .. }),
+        cube: matches!(answer, Answer::Cube(_)),
         environment_map: batch.work.scene.environment.is_some(),
         light_count: batch.work.scene.light_count,
         traversal: traced.traversal,
@@ -174,10 +194,7 @@ fn find(
     let detail = rays.len();
     let cameras = batch.uniform_of_lamp(recording.gpu, &recording.pieces, &recording.sums, lamp as u32, rays);
     for (camera, target) in surfaces.iter().enumerate() {
-        let own = [Binding::buffer("camera", &cameras)]
-            .into_iter()
-            .chain(target.bindings())
-            .chain(maps.iter().flat_map(DrawnMaps::bindings));
+        let own = [Binding::buffer("camera", &cameras)].into_iter().chain(target.bindings()).chain(answer.bindings());
         let bound = recording.bind(&variant, detail, own)?;
         recording.dispatch(&bound, camera);
     }

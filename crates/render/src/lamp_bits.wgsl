@@ -1,5 +1,5 @@
-// Which places of a grid on a lamp the surface of each pixel sees (Xie et al. 2016, Algorithm 5): by shadow maps from the places, or by
-// rays, as for places whose maps do not hold the surface.
+// Which places of a grid on a lamp the surface of each pixel sees (Xie et al. 2016, Algorithm 5): by shadow maps from the places, by walks
+// through a layered cube, or by rays, as for places that neither answers for.
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
@@ -15,6 +15,12 @@
 {% include "spot.wgsl" %}
 
 {% include "grid.wgsl" %}
+{% if maps or cube %}
+
+const OPEN: u32 = 0u;
+const BLOCKED: u32 = 1u;
+const BEYOND: u32 = 2u;
+{% endif %}
 {% if maps %}
 
 struct LampPoint { eye_in_world: vec3f, near_m: f32, principal_px: vec2f }
@@ -39,10 +45,6 @@ const BIAS_TEXELS: f32 = 0.5;
 const BIAS_TEXELS_A_SLOPE: f32 = 0.75;
 const MOST_SLOPE: f32 = 8.0;
 
-const OPEN: u32 = 0u;
-const BLOCKED: u32 = 1u;
-const BEYOND: u32 = 2u;
-
 fn seen_in_map(layer: u32, spot: Spot, cosine: f32) -> u32 {
     let near_m = lamp_maps.points[layer].near_m;
     let focal_px = vec2f(lamp_maps.focal_x_px, lamp_maps.focal_y_px);
@@ -60,18 +62,31 @@ fn seen_in_map(layer: u32, spot: Spot, cosine: f32) -> u32 {
     return select(OPEN, BLOCKED, nearest * (depth_m - texels * texel_m) > near_m);
 }
 {% endif %}
+{% if cube %}
+{% include "cube_walk.wgsl" %}
+
+// Slanting rays leave the samples of the surface that they begin on as late as ones of this cosine.
+const LEAST_COSINE_OFF: f32 = 0.25;
+
+fn seen_in_cube(spot: Spot, incident: Incident, cosine: f32) -> u32 {
+    let near_m = cube.start_m / max(cosine, LEAST_COSINE_OFF);
+    let hit = walk(cube_ray(spot.point, incident.towards), near_m, incident.distance_m);
+    return select(select(BEYOND, OPEN, hit.is_empty), BLOCKED, hit.met);
+}
+{% endif %}
 
 fn sees(lamp: u32, spot: Spot, i: u32) -> bool {
     let incident = incident_from(illumination.lights[lamp], spot.point, grid_place(camera.first_shadow_ray + i));
     let cosine = dot(spot.normal, incident.towards);
     var needs_ray = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0));
     var open = needs_ray;
-{% if maps %}
-    if needs_ray {
-        let seen = seen_in_map(i, spot, cosine);
-        open = seen == OPEN;
-        needs_ray = seen == BEYOND;
+{% if maps or cube %}
+    var seen = OPEN;
+    for (var asks = needs_ray; asks; asks = false) {
+        seen = {{ "seen_in_map(i, spot, cosine)" if maps else "seen_in_cube(spot, incident, cosine)" }};
     }
+    open = needs_ray && seen == OPEN;
+    needs_ray = needs_ray && seen == BEYOND;
 {% endif %}
     // A loop, not a branch: the software device skips only loops that no lane needs.
     for (; needs_ray; needs_ray = false) {

@@ -1,7 +1,7 @@
 //! Shadow maps from places of a rectangle: what is nearest to each of them, of the scene or of samples of it.
 
 use depth_image::PinholeCamera;
-use gpu::{DrawPass, Frame};
+use gpu::{DrawPass, Frame, cube_walk::CubeBricks};
 use wgpu::TextureView;
 
 use crate::{RenderError, layers::LayerKind};
@@ -28,18 +28,20 @@ pub trait LampMapSource: Sync {
     ) -> Result<(), RenderError>;
 }
 
-/// The shadow maps of rectangles, for light that asks them.
+/// The shadow maps of rectangles, and the cube, for light that asks them.
 #[derive(Clone, Copy)]
 pub struct LampMaps<'a> {
-    /// Width and height.
+    /// Width and height of maps.
     pub side_px: u32,
     /// Where maps come from that are not of the scene itself.
     pub samples: Option<&'a dyn LampMapSource>,
+    /// The scene's layered cube.
+    pub cube: Option<&'a CubeBricks>,
 }
 
 impl Default for LampMaps<'_> {
     fn default() -> Self {
-        Self { side_px: DEFAULT_SIDE_PX, samples: None }
+        Self { side_px: DEFAULT_SIDE_PX, samples: None, cube: None }
     }
 }
 

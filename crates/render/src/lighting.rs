@@ -48,7 +48,7 @@ pub enum Direct {
     Grid(NonZeroU32, GridVisibility),
 }
 
-/// How the places of a rectangle's grid that a point sees are found; those of other lamps are found by rays.
+/// How the places of a grid that a point sees are found. Maps are of rectangles: the places of other lamps are found by rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum GridVisibility {
     /// One ray to each place.
@@ -58,6 +58,8 @@ pub enum GridVisibility {
     Maps,
     /// A shadow map from each place, of what sample images from the lamp hold.
     Samples,
+    /// A walk to each place, and to those of lamps of all kinds, through the samples of a layered depth cube.
+    Cube,
 }
 
 /// Light from all around, by cosine-weighted rays a pixel.
@@ -75,7 +77,7 @@ pub enum Ambient {
 #[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
     #[error(
-        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, soft NxN [by rays|maps|samples], occlusion N, occlusion N RADIUSm, indirect N, reflections N and glossy N with commas between them"
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, soft NxN [by rays|maps|samples|cube], occlusion N, occlusion N RADIUSm, indirect N, reflections N and glossy N with commas between them"
     )]
     Term(String),
     #[error("lighting {0:?}: {1} must be from 1 to {2}")]
@@ -119,14 +121,10 @@ impl Lighting {
         if let Direct::Grid(side, _) = self.direct { side.get() } else { 0 }
     }
 
-    /// Where shadow maps of rectangles come from; `None` for light that needs none.
+    /// How the places of a grid are found; by rays for light without one.
     #[must_use]
-    pub fn grid_maps(&self) -> Option<GridVisibility> {
-        if let Direct::Grid(_, maps @ (GridVisibility::Maps | GridVisibility::Samples)) = self.direct {
-            Some(maps)
-        } else {
-            None
-        }
+    pub fn grid_visibility(&self) -> GridVisibility {
+        if let Direct::Grid(_, visibility) = self.direct { visibility } else { GridVisibility::Rays }
     }
 
     /// Rays a pixel of the light from all around.
@@ -311,10 +309,20 @@ fn side_of_square(places: NonZeroU32) -> NonZeroU32 {
 
 impl GridVisibility {
     /// All with their words.
-    const NAMES: [(Self, &str); 3] = [(Self::Rays, "rays"), (Self::Maps, "maps"), (Self::Samples, "samples")];
+    const NAMES: [(Self, &str); 4] =
+        [(Self::Rays, "rays"), (Self::Maps, "maps"), (Self::Samples, "samples"), (Self::Cube, "cube")];
+
+    /// Whether each place of a rectangle has a shadow map.
+    pub(crate) fn has_maps(self) -> bool {
+        matches!(self, Self::Maps | Self::Samples)
+    }
 
     fn named(word: &str) -> Option<Self> {
         Self::NAMES.into_iter().find(|(_, name)| *name == word).map(|(visibility, _)| visibility)
+    }
+
+    fn name(self) -> &'static str {
+        Self::NAMES.into_iter().find(|(visibility, _)| *visibility == self).map_or("rays", |(_, name)| name)
     }
 }
 
@@ -331,8 +339,7 @@ impl fmt::Display for Lighting {
             Direct::Shadows => write!(f, "shadows")?,
             Direct::Soft(rays) => write!(f, "soft {rays}")?,
             Direct::Grid(side, GridVisibility::Rays) => write!(f, "soft {side}x{side}")?,
-            Direct::Grid(side, GridVisibility::Maps) => write!(f, "soft {side}x{side} by maps")?,
-            Direct::Grid(side, GridVisibility::Samples) => write!(f, "soft {side}x{side} by samples")?,
+            Direct::Grid(side, visibility) => write!(f, "soft {side}x{side} by {}", visibility.name())?,
         }
         match self.ambient {
             Some(Ambient::Occlusion(rays, Some(radius_m))) => write!(f, ", occlusion {rays} {radius_m}m")?,
@@ -373,6 +380,7 @@ mod tests {
             "soft 16x16",
             "soft 32x32 by maps, occlusion 16",
             "soft 1x1 by samples",
+            "soft 32x32 by cube",
         ] {
             assert_eq!(name.parse::<Lighting>().expect(name).to_string(), name);
         }

@@ -398,7 +398,12 @@ impl Renderer {
             Visibility::Measured => self.is_by_rays(work, cameras[0].reference())?,
         };
         let lighting = work.lighting;
-        if lighting.grid_maps() == Some(GridVisibility::Samples) && work.lamp_maps.samples.is_none() {
+        let is_answered = match lighting.grid_visibility() {
+            GridVisibility::Rays | GridVisibility::Maps => true,
+            GridVisibility::Samples => work.lamp_maps.samples.is_some(),
+            GridVisibility::Cube => work.lamp_maps.cube.is_some(),
+        };
+        if !is_answered {
             return Err(RenderError::LampSamples { lighting: lighting.to_string() });
         }
         let needs_tree = by_rays || work.lighting.is_traced();

@@ -1,7 +1,7 @@
 //! Places of sample cameras.
 
 use depth_image::{Aabb, PinholeCamera};
-use glam::{Affine3A, UVec2, Vec2, Vec3};
+use glam::{Affine3A, UVec2, Vec2, Vec3, Vec3Swizzles as _};
 
 /// Four cameras at the corners of a rectangle, all looking at one point: the two-plane rig of Lages
 /// §4.1. The rectangle is the view cell; views lie within it.
@@ -34,6 +34,10 @@ const CORNER_SHARE: f32 = 0.98;
 const FRAME_ASPECT: f32 = 4.0 / 3.0;
 /// The direction from a model to the eye: a three-quarter view, 25° from the front and 30° above.
 const THREE_QUARTER: Vec3 = Vec3::new(0.3660, 0.5, 0.7849);
+/// Cameras of a block stand so far over its highest point, in halves of its width: as the paper's over their tile.
+const BLOCK_CLEARANCE: f32 = 3.0;
+/// Flat blocks are seen within less.
+const MAX_BLOCK_FOV_RAD: f32 = 2.0;
 /// The least distance from an eye to a model's nearest point, in radii of the model.
 const LEAST_GAP_RADII: f32 = 0.5;
 
@@ -55,6 +59,60 @@ impl Rig {
             fov_y_rad: FOV_Y_RAD,
             near_m: half.max_element() * 0.05,
         })
+    }
+
+    /// Over each block of a grid of columns and rows on the ground of a volume, row after row: above its corners, three halves of its
+    /// width over its highest point, with all of it in view. `points_in_world` are the scene's vertices; a block without any is as
+    /// high as the volume. `size_px` is the size of the sample images.
+    ///
+    /// # Errors
+    /// When the volume is empty.
+    pub fn of_blocks(
+        volume: &Aabb,
+        grid: UVec2,
+        points_in_world: impl Iterator<Item = Vec3>,
+        size_px: UVec2,
+    ) -> Result<Vec<(Aabb, Self)>, RigError> {
+        check(volume)?;
+        let side = volume.size() / Vec3::new(grid.x as f32, 1.0, grid.y as f32);
+        let mut heights = vec![Aabb::EMPTY; grid.element_product() as usize];
+        for point in points_in_world {
+            let place = ((point - volume.min) / side.max(Vec3::splat(f32::MIN_POSITIVE))).as_uvec3().xz().min(grid - 1);
+            let height = &mut heights[(place.y * grid.x + place.x) as usize];
+            *height = height.grown_to(point);
+        }
+        let blocks = (0..).zip(heights).map(|(number, height)| {
+            let min = volume.min + side * Vec3::new((number % grid.x) as f32, 0.0, (number / grid.x) as f32);
+            let block = Aabb { min, max: min + side };
+            let top = if height.is_empty() { block.max.y } else { height.max.y };
+            let half_m = 0.5 * side.x.max(side.z);
+            let over = Self::two_plane(&block, (top - block.min.y) / half_m + BLOCK_CLEARANCE)?;
+            let fov_y_rad = over.fov_for(&Aabb { max: block.max.with_y(top), ..block }, size_px);
+            Ok((block, Self { fov_y_rad, ..over }))
+        });
+        blocks.collect()
+    }
+
+    /// As [`Self::two_plane`], as high over a volume as the highest cameras of its blocks: views between them fly over it.
+    ///
+    /// # Errors
+    /// When the volume is empty.
+    pub fn over_blocks(volume: &Aabb, blocks: &[(Aabb, Self)]) -> Result<Self, RigError> {
+        let top = blocks.iter().map(|(_, rig)| rig.center_in_world.y).fold(volume.max.y, f32::max);
+        let size = volume.size();
+        Self::two_plane(volume, 2.0 * (top - volume.min.y) / size.x.max(size.z))
+    }
+
+    /// The field of view in which all four cameras see all of a box, for images of a size.
+    fn fov_for(&self, seen: &Aabb, size_px: UVec2) -> f32 {
+        let aspect = size_px.x as f32 / size_px.y.max(1) as f32;
+        let slopes = self.samples(size_px).into_iter().flat_map(|camera| {
+            seen.corners().map(|corner| {
+                let in_camera = camera.world_from_camera.conjugate() * (corner - camera.eye_in_world);
+                (in_camera.x.abs() / aspect).max(in_camera.y.abs()) / (-in_camera.z).max(f32::MIN_POSITIVE)
+            })
+        });
+        (2.0 * slopes.fold(0.0, f32::max).atan()).min(MAX_BLOCK_FOV_RAD)
     }
 
     /// Around a camera that a scene names, which may stand within it: neighbouring cameras see what is `distance_m` before it
@@ -214,6 +272,31 @@ mod tests {
     }
 
     #[test]
+    fn blocks_fill_the_volume_and_their_cameras_stand_above_it() {
+        let volume = Aabb { min: Vec3::new(-3.0, 0.0, -1.0), max: Vec3::new(3.0, 5.0, 1.0) };
+        let tower = [Vec3::new(2.9, 5.0, 0.9), Vec3::new(-2.9, 0.5, -0.9)];
+        let size_px = UVec2::new(40, 30);
+        let of = |volume: &Aabb, grid| Rig::of_blocks(volume, grid, tower.into_iter(), size_px);
+        let blocks = of(&volume, UVec2::new(3, 2)).expect("blocks");
+        assert_eq!(blocks.len(), 6);
+        let filled: f32 = blocks.iter().map(|(block, _)| block.size().element_product()).sum();
+        assert!((filled - volume.size().element_product()).abs() < 1e-3);
+        assert_eq!(blocks[4].0, Aabb { min: Vec3::new(-1.0, 0.0, 0.0), max: Vec3::new(1.0, 5.0, 1.0) });
+        for (number, top) in [(0, 0.5), (1, 5.0), (5, 5.0)] {
+            let (block, rig) = &blocks[number];
+            for camera in rig.samples(size_px) {
+                camera.validate().expect("valid");
+                assert!((camera.eye_in_world.y - top - 3.0).abs() < 1e-4, "{number}: {camera:?}");
+                for corner in (Aabb { max: block.max.with_y(top), ..*block }).corners() {
+                    let at = camera.project(corner).expect("in front").pixel;
+                    assert!(at.cmpge(Vec2::splat(-1e-3)).all() && at.cmple(size_px.as_vec2() + 1e-3).all(), "{at}");
+                }
+            }
+        }
+        assert_eq!(of(&Aabb::EMPTY, UVec2::ONE), Err(RigError));
+    }
+
+    #[test]
     fn a_rig_is_found_again_from_its_cameras() {
         let block = Aabb { min: Vec3::new(-1.0, 0.0, -2.0), max: Vec3::new(1.0, 1.0, 2.0) };
         let size_px = UVec2::new(40, 30);
@@ -255,6 +338,4 @@ mod tests {
         assert_eq!(Rig::two_plane(&Aabb::EMPTY, 3.0), Err(RigError));
         assert_eq!(Rig::in_front_of(&Aabb { min: Vec3::NAN, max: Vec3::NAN }, 0.1), Err(RigError));
     }
-
-    use glam::Vec3Swizzles;
 }

@@ -17,6 +17,8 @@ pub const SCENES: [&str; 4] = ["urban", "bird-nest", "tree", "grass"];
 const WARM_UP_PX: u32 = 64;
 /// Places along a side of the grid where only time is measured: it grows as the number of maps does.
 const FEW_MAPS_SIDE: u32 = 4;
+/// A layered cube with as many lines along its longest side as images have texels.
+pub const CUBE: &str = "layered_cube";
 /// Maps of the scene itself.
 pub const OF_SCENE: &str = "maps of the scene";
 
@@ -64,6 +66,13 @@ pub struct Shadows {
 impl Shadows {
     pub fn find(&self, setting: Setting, sampling: &str) -> Option<&ShadowRow> {
         self.rows.iter().find(|row| row.setting == setting && row.sampling == sampling)
+    }
+
+    /// The error i against rays of a cube, over that of the best images.
+    pub fn cube_ratio(&self, setting: Setting) -> Option<f64> {
+        let of_images = SAMPLINGS.iter().filter_map(|sampling| self.find(setting, sampling));
+        let best = of_images.map(|row| row.against_rays.intensity).min_by(f64::total_cmp)?;
+        Some(self.find(setting, CUBE)?.against_rays.intensity / best)
     }
 
     /// The error i against shadow maps of the better non-redundant sampling.
@@ -140,8 +149,8 @@ fn of_setting(engine: &GpuEngine, setting: Setting, view_px: u32) -> anyhow::Res
     };
     let mut rows = Vec::new();
     let mut bits = vec![("rays", rays.words.clone()), (OF_SCENE, maps.words.clone())];
-    for sampling in SAMPLINGS {
-        let sampled = by_samples(&subject, sampling, setting.map_px, GRID_SIDE)?;
+    for sampling in SAMPLINGS.into_iter().chain([CUBE]) {
+        let sampled = sampled_bits(&subject, sampling, setting.map_px, GRID_SIDE)?;
         rows.push(ShadowRow {
             setting,
             sampling,
@@ -171,11 +180,18 @@ struct SampledBits {
     images_s: f64,
 }
 
-/// The first run of a single place takes the lamp's images, too.
-fn by_samples(subject: &Subject<'_>, sampling: &str, side_px: u32, grid_side: u32) -> anyhow::Result<SampledBits> {
-    let lamp = LampSampling { sampling: sampling.parse::<SamplingMethod>()?, side_px, ..LampSampling::default() };
-    subject.bits(Answer::Samples(LampSampling { side_px: WARM_UP_PX, ..lamp }), 1)?;
-    let answer = Answer::Samples(lamp);
+fn answer_by(sampling: &str, side_px: u32) -> anyhow::Result<Answer> {
+    if sampling == CUBE {
+        return Ok(Answer::Cube { side: side_px });
+    }
+    let sampling = sampling.parse::<SamplingMethod>()?;
+    Ok(Answer::Samples(LampSampling { sampling, side_px, ..LampSampling::default() }))
+}
+
+/// The first run of a single place takes the lamp's images, or the cube, too.
+fn sampled_bits(subject: &Subject<'_>, sampling: &str, side_px: u32, grid_side: u32) -> anyhow::Result<SampledBits> {
+    subject.bits(answer_by(sampling, WARM_UP_PX)?, 1)?;
+    let answer = answer_by(sampling, side_px)?;
     let with_images = subject.bits(answer, 1)?;
     let without_images = subject.bits(answer, 1)?;
     let images_s = (with_images.seconds - without_images.seconds).max(0.0);
@@ -209,8 +225,8 @@ pub fn times(engine: &GpuEngine, setting: Setting, view_px: u32) -> anyhow::Resu
     let maps = warm_bits(&subject, Answer::Maps { side_px: setting.map_px }, FEW_MAPS_SIDE)?;
     let scene = setting.scene;
     let mut rows = vec![TimeRow { scene, triangles, answer: OF_SCENE, images_s: 0.0, maps_s: maps.seconds }];
-    for answer in ["conventional", "non_redundant:pixel", "depth_peeling:4"] {
-        let sampled = by_samples(&subject, answer, setting.map_px, FEW_MAPS_SIDE)?;
+    for answer in ["conventional", "non_redundant:pixel", "depth_peeling:4", CUBE] {
+        let sampled = sampled_bits(&subject, answer, setting.map_px, FEW_MAPS_SIDE)?;
         rows.push(TimeRow { scene, triangles, answer, images_s: sampled.images_s, maps_s: sampled.bits.seconds });
     }
     Ok(rows)
@@ -240,15 +256,15 @@ pub fn front(engine: &GpuEngine, setting: Setting, view_px: u32, most_rays: u32)
     let subject = Subject::load(engine, setting.scene, setting.lamp_size, view_px)?;
     engine.set_lamp_sampling(LampSampling { side_px: setting.map_px, ..LampSampling::default() });
     let (truth, _) = subject.view("soft 32x32")?;
-    // Shaders and the lamp's images.
-    for lighting in ["soft 1", "soft 1x1 by maps", "soft 1x1 by samples"] {
+    // Shaders, the lamp's images and the cube.
+    for lighting in ["soft 1", "soft 1x1 by maps", "soft 1x1 by samples", "soft 1x1 by cube"] {
         subject.view(lighting)?;
     }
     let numbers = std::iter::successors(Some(1_u32), |rays| Some(rays * 2)).take_while(|rays| *rays <= most_rays);
     let by_rays = numbers.map(|rays| ("rays", format!("soft {rays}")));
-    let of_maps = ["maps", "samples"].map(|answer| (answer, format!("soft 16x16 by {answer}")));
+    let of_maps = ["maps", "samples", "cube"].map(|answer| (answer, format!("soft 16x16 by {answer}")));
     let rows: Vec<(&'static str, String)> = by_rays.chain(of_maps).collect();
-    measure_rows("rays, maps and samples", rows, |(answer, lighting)| {
+    measure_rows("rays, maps, samples and cube", rows, |(answer, lighting)| {
         let (view, seconds) = subject.view(&lighting)?;
         Ok(FrontRow { name: lighting, answer, seconds, error: color_error(&truth, &view) })
     })

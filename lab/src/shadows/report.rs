@@ -211,6 +211,9 @@ fn checks(measured: &Measured) -> Vec<Check> {
         let name = format!("time of maps from samples over maps of the scene, {scene}");
         checks.push(check_if_measured(name, ratio, "×", Bar::AtMost(most), NOT_MEASURED));
     }
+    let cubes = measured.scenes.iter().filter_map(|&setting| shadows.cube_ratio(setting)).fold(f64::NAN, f64::max);
+    let name = "i against rays, a layered cube over the best images, worst scene";
+    checks.push(check_if_measured(name, all_scenes.then_some(cubes), "×", Bar::AtMost(0.75), NOT_MEASURED));
     checks
 }
 

@@ -26,8 +26,14 @@ pub struct Subject<'e> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Answer {
     Rays,
-    Maps { side_px: u32 },
+    Maps {
+        side_px: u32,
+    },
     Samples(LampSampling),
+    /// A layered cube.
+    Cube {
+        side: u32,
+    },
 }
 
 /// Which places of the lamp each pixel sees.
@@ -75,6 +81,7 @@ impl<'e> Subject<'e> {
             Answer::Rays => ("rays", default),
             Answer::Maps { side_px } => ("maps", LampSampling { side_px, ..default }),
             Answer::Samples(sampling) => ("samples", sampling),
+            Answer::Cube { side } => ("cube", LampSampling { side_px: side, ..default }),
         };
         let lighting = format!("soft {grid_side}x{grid_side} by {word}");
         self.engine.set_lamp_sampling(sampling);

@@ -28,8 +28,8 @@ pub struct UpArgs {
     device: DeviceArgs,
     #[command(flatten)]
     limits: NodeLimitArgs,
-    /// How rectangle lights are sampled under "soft NxN by samples": a sampling method, the side of images and shadow maps,
-    /// and mesh or hybrid_mesh[:PX]
+    /// How rectangle lights are sampled under "soft NxN by samples": a sampling method, the side of images and shadow maps
+    /// (and of the layered cube of "by cube"), and mesh or hybrid_mesh[:PX]
     #[arg(long, value_name = "SAMPLING SIDE METHOD", default_value_t)]
     lamp_samples: LampSampling,
     /// Nodes P that share the device

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod bases;
+mod blocks;
 mod cells;
 mod cubes;
 mod delivery;

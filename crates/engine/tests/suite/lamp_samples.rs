@@ -70,7 +70,38 @@ fn samples_of_a_lamp_cast_nearly_the_shadows_of_the_scene() {
         assert!(by_samples == view("soft 4x4 by samples"), "{sampling}: the second view has the same samples");
         assert!(before.replace(by_samples.clone()) != Some(by_samples), "{sampling}: samples of its own");
     }
+    engine().set_lamp_sampling("conventional 256 mesh".parse().expect("a name"));
+    let by_cube = view("soft 4x4 by cube");
+    let share = differing_share(&rays, &by_cube);
+    assert!(share < 0.3 * shadows, "a cube: {share} of {shadows}");
+    assert!(by_cube == view("soft 4x4 by cube"), "the second view has the same cube");
     engine().set_lamp_sampling(LampSampling::default());
+}
+
+/// A cube knows what any lamp sees: here a sphere and parallel light, too.
+#[test]
+fn a_cube_answers_for_lamps_of_all_kinds() {
+    let mut scene = scene();
+    let bounds = scene.bounds();
+    scene.illumination.lights = vec![
+        Light::Point {
+            position_in_world: bounds.center() + Vec3::Y * bounds.size().length(),
+            intensity_linear: Vec3::splat(bounds.size().length_squared()),
+            radius_m: 0.1 * bounds.size().length(),
+        },
+        Light::Directional {
+            towards_light_in_world: Vec3::new(0.6, 0.8, 0.0),
+            irradiance_linear: Vec3::ONE,
+            angular_radius_rad: 0.05,
+        },
+    ];
+    engine().put_scene("trees under a sphere and the sun", &scene).expect("a scene");
+    let view =
+        |lighting: &str| drawn(engine(), "trees under a sphere and the sun", camera(&scene), lighting).expect(lighting);
+    let rays = view("soft 4x4");
+    let shadows = differing_share(&rays, &view("phong"));
+    let share = differing_share(&rays, &view("soft 4x4 by cube"));
+    assert!(shadows > 0.1 && share < 0.3 * shadows, "{share} of {shadows}");
 }
 
 #[test]

@@ -10,6 +10,9 @@ use depth_image::{LOBE_ROUGHNESS, LOBE_SIZE_PX};
 use minijinja::{Environment, UndefinedBehavior, Value};
 
 use super::interface::DynamicUniforms;
+use crate::cube_walk::{
+    ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, MORE_ENTRIES, SQUARE_REACH, WALK_NUDGE,
+};
 use crate::{error::ShaderError, table::TABLE_WIDTH_LOG2};
 
 /// Shader texts by name.
@@ -54,8 +57,8 @@ macro_rules! shared_files {
     };
 }
 
-const SHARED: [(&str, &str); 10] =
-    shared_files! { background color normal light environment highlight sequence lobe table tone };
+const SHARED: [(&str, &str); 11] =
+    shared_files! { background color cube_walk normal light environment highlight sequence lobe table tone };
 
 impl Templates {
     /// The shared includes, and `own` templates as (name, text).
@@ -73,7 +76,10 @@ impl Templates {
                 .add_template(name, text)
                 .map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         }
-        Ok(Self { environment, declared: Vec::new(), dynamic_uniforms: &[] })
+        let declared = crate::wgsl_constants! {
+            ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, MORE_ENTRIES, SQUARE_REACH, WALK_NUDGE
+        };
+        Ok(Self { environment, declared: declared.to_vec(), dynamic_uniforms: &[] })
     }
 
     /// Adds values for `{{ NAME }}` in all templates, such as those of [`wgsl_constants!`](crate::wgsl_constants).

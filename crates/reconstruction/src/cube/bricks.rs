@@ -2,25 +2,15 @@
 
 use depth_image::oct8_from_unit;
 use glam::UVec3;
+use gpu::cube_walk::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, MORE_ENTRIES, MOST_REACH, SQUARE_REACH, VOXEL};
 
 use super::reaches::reaches;
 use super::samples::CubeSamples;
 
 /// Steeper planes are no entries: another axis holds them. A sample is met where its normal has this share along the line at least.
 pub(crate) const LEAST_NORMAL_ALONG_LINE: f32 = 0.5;
-/// Planes reach no farther from their sample along the line, in spacings: `SQUARE_REACH` times the greatest sum of both slopes.
-const MOST_REACH: f32 = 1.4;
-/// An entry's depth is counted from this far below its voxel, in these steps, in spacings.
-pub(crate) const ENTRY_DEPTH_BELOW: f32 = MOST_REACH;
-pub(crate) const ENTRY_DEPTH_STEP: f32 = (2.0 * MOST_REACH + VOXEL) / 16383.0;
-/// The side of a voxel, in spacings.
-const VOXEL: f32 = 2.0;
-/// Samples reach a little over the middle between two lines, in spacings: no ray passes between two squares.
-pub(crate) const SQUARE_REACH: f32 = 0.55;
-/// Of an entry that is the first of its leaf: more than one other follows.
-pub(crate) const MORE_ENTRIES: u32 = 1 << 31;
 
-/// The tables of `cube/walk.wgsl`.
+/// The tables of `cube_walk.wgsl`.
 pub(super) struct Bricks {
     pub cells: Vec<u32>,
     pub bricks: Vec<[u32; 4]>,

@@ -6,13 +6,13 @@ mod links;
 mod reaches;
 mod samples;
 
-use bytemuck::{Pod, Zeroable};
 use depth_image::{CubeGrid, CubeImages, LayeredDepthImage};
 use glam::Vec3;
+use gpu::cube_walk::{CubeBricks, GpuCube};
 use gpu::{Binding, GpuError, Table, TablePool, Turn};
-use wgpu::{BufferUsages, TextureFormat};
+use wgpu::TextureFormat;
 
-pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, LEAST_NORMAL_ALONG_LINE, MORE_ENTRIES, SQUARE_REACH};
+pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
 pub(crate) use light_field::{FOOTPRINT_SHARE, GpuLightField, LEAST_LOBE_SHARE, LightField};
 pub(crate) use light_field::{MOST_MASKING, NEAREST_SPACINGS};
 pub(crate) use links::links;
@@ -22,35 +22,18 @@ use self::bricks::Bricks;
 use crate::reflectors::{ReflectingPlanes, Reflectors};
 use crate::{error::ReconstructionError, set_description::SetDescription};
 
-/// A ray steps this far into the next box, in spacings: more than the rounding of coordinates within the largest cube.
-pub(crate) const WALK_NUDGE: f32 = 2e-3;
-/// A surface that is met so far outside of its voxel counts, in spacings.
-pub(crate) const HIT_SLACK: f32 = 0.1;
-/// Steps of a ray, of which each crosses a voxel or empty cells.
-pub(crate) const MAX_CUBE_STEPS: u32 = 8192;
 /// Rays straight off a surface meet nothing below this height, in spacings, and slanting ones nothing within up to four times as much
 /// of their way: samples of the surface itself may stand there.
 const START_SPACINGS: f32 = 0.75;
 /// Bits of an entry for a sample's number.
 const MAX_SAMPLES: usize = 1 << 28;
 
-/// `Cube` of `cube/walk.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuCube {
-    pub cube_from_world: [[f32; 4]; 3],
-    pub size: [u32; 3],
-    pub columns: u32,
-    pub rows: u32,
-    pub start_m: f32,
-    pub padding: [u32; 2],
-}
-
 /// A layered depth cube, ready to be walked through.
 pub(crate) struct Cube {
-    own: wgpu::Buffer,
-    /// Tables with their names in shaders.
-    tables: [(&'static str, Table); 5],
+    /// What rays are walked through.
+    pub bricks: CubeBricks,
+    /// What gives them colours.
+    samples: Table,
     /// A ray straight off a surface meets nothing nearer.
     pub start_m: f32,
     /// Some line has met more surfaces than it holds.
@@ -88,15 +71,15 @@ impl Cube {
             start_m,
             padding: [0; 2],
         };
+        let texels = [
+            tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?,
+            tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?,
+            tables.upload("leaves of a cube", TextureFormat::Rgba32Uint, &bricks.leaves, turn)?,
+            tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
+        ];
         Ok(Self {
-            own: tables.gpu.buffer_with("cube", &[cube], BufferUsages::UNIFORM),
-            tables: [
-                ("cube_cells", tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?),
-                ("cube_bricks", tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?),
-                ("cube_leaves", tables.upload("leaves of a cube", TextureFormat::Rgba32Uint, &bricks.leaves, turn)?),
-                ("cube_entries", tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?),
-                ("cube_samples", tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?),
-            ],
+            bricks: CubeBricks::new(&tables.gpu, cube, texels),
+            samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
             reflectors: Reflectors::upload(tables, &reflecting, Some(&samples.place), set, turn)?,
             start_m,
             light_field: light_field.as_ref().map(|field| LightField::upload(tables, field, turn)).transpose()?,
@@ -106,11 +89,12 @@ impl Cube {
 
     /// The resources of passes that walk through it, show what its samples reflect, or gather in its light field.
     pub fn bindings(&self) -> Vec<Binding<'_>> {
-        let mut bindings = vec![Binding::buffer("cube", &self.own)];
-        let field = self.light_field.as_ref();
-        bindings.extend(field.map(|field| Binding::buffer("light_field", &field.own)));
-        let tables = self.tables.iter().chain(field.into_iter().flat_map(|field| &field.tables));
-        bindings.extend(tables.map(|(name, table)| Binding::texture(name, table)));
+        let mut bindings: Vec<_> = self.bricks.bindings().collect();
+        bindings.push(Binding::texture("cube_samples", &self.samples));
+        if let Some(field) = &self.light_field {
+            bindings.push(Binding::buffer("light_field", &field.own));
+            bindings.extend(field.tables.iter().map(|(name, table)| Binding::texture(name, table)));
+        }
         bindings.extend(self.reflectors.iter().flat_map(Reflectors::bindings));
         bindings
     }

@@ -18,7 +18,7 @@
 {%- else %}
 {% include "found.wgsl" %}
 {%- endif %}
-{% include "cube/walk.wgsl" %}
+{% include "cube_walk.wgsl" %}
 {% include "cube/colors.wgsl" %}
 {%- if reflects or bounced %}
 @group(0) var<uniform> illumination: Illumination;
@@ -89,7 +89,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- if left %}
     if (ray_provenance[index] & 0xffu) != PROVENANCE_FILLED { return; }
 {%- endif %}
-    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), {{ "max(ray.near_m, cube.start_m)" if left else "ray.near_m" }});
+    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), {{ "max(ray.near_m, cube.start_m)" if left else "ray.near_m" }}, BEYOND_CUBE);
     let guess = unpack4x8unorm(ray.guess);
     let is_unknown = !hit.met{{ "" if truncated else " && !hit.is_empty" }};
     // Where nothing is met the environment is seen; where the cube does not know, what the mirror shows without rays.
@@ -120,7 +120,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 fn main(@builtin(global_invocation_id) id: vec3u) {
 {% include "at_pixel.wgsl" %}
     let pixel = pixel_of(place);
-    let hit = walk(cube_ray(work.view.eye_in_world, pixel.direction), work.view.near_m);
+    let hit = walk(cube_ray(work.view.eye_in_world, pixel.direction), work.view.near_m, BEYOND_CUBE);
     var shown = vec3f(0.0);
     for (var met = hit.met; met; met = false) {
         let point_in_world = work.view.eye_in_world + pixel.direction * hit.t;

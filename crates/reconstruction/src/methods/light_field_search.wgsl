@@ -132,11 +132,10 @@ fn color_at(place: Place) -> vec3f {
 {% endif %}
 }
 
-@compute @workgroup_size(TILE_PX, TILE_PX)
+@compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let at = pixel_at(id);
-    if any(at >= work.view.size_px) { return; }
-    let pixel = pixel_of(at);
+{% include "at_pixel.wgsl" %}
+    let pixel = pixel_of(place);
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     if span.near > span.far {
         write_pixel(pixel.index, 0u, 0.0, PROVENANCE_EMPTY);
@@ -144,7 +143,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let rays = image_rays(pixel.direction);
     let found = search(rays, span, tile_start_m[pixel.tile]);
-    let place = most_conservative(rays, found.t);
-    let hit = found.entered && place.mask != 0u;
-    write_found(pixel.index, hit, found.t, color_at(place), origin_of(place.mask, 0u), found.never_unseen);
+    let seen_at = most_conservative(rays, found.t);
+    let hit = found.entered && seen_at.mask != 0u;
+    write_found(pixel.index, hit, found.t, color_at(seen_at), origin_of(seen_at.mask, 0u), found.never_unseen);
 }

@@ -195,13 +195,14 @@ impl ReconstructionMethod {
         matches!(self, Layered { followed: Some(_) })
     }
 
-    /// Rays are followed from where their tiles start; other methods draw.
-    pub(crate) fn follows_rays(self) -> bool {
+    /// Rays are followed from where their tiles start; other methods draw, or walk through a cube.
+    #[must_use]
+    pub fn follows_rays(self) -> bool {
         matches!(self, LightFieldSearch { .. } | JointCarve { .. })
     }
 
-    /// Records the method's passes, for listed pixels or for all; gives the pixels that stay unknown. Lists come from
-    /// [`Self::share_positions`]. Methods that walk through a cube add highlights and what mirrors show, by `bounces`.
+    /// Records the method's passes, for listed pixels or for all; gives the pixels that stay unknown. Lists are for methods that
+    /// follow rays. Methods that walk through a cube add highlights and what mirrors show, by `bounces`.
     pub(crate) fn record(
         self,
         drawing: &QuadDrawing,
@@ -211,7 +212,7 @@ impl ReconstructionMethod {
         bounces: Option<&Bounces<'_>>,
     ) -> Result<PixelList, ReconstructionError> {
         match self {
-            LightFieldSearch { steps } => light_field_search::record(recording, steps),
+            LightFieldSearch { steps } => light_field_search::record(recording, steps, listed),
             JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
             Layered { followed } => layered::record(recording, bounces, followed),

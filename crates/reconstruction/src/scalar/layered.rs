@@ -2,9 +2,10 @@
 
 use depth_image::{CubeGrid, LayeredDepthImage, PinholeCamera, ProvenanceKind, Ray, View, linear_from_rgb9e5};
 use glam::{IVec2, Vec2, Vec3};
+use gpu::cube_walk::SQUARE_REACH;
 
 use super::{pixel::Pixel, surface::bilinear_shares, view, view_ray::places};
-use crate::cube::{CubeSamples, LEAST_NORMAL_ALONG_LINE, Links, SQUARE_REACH, links};
+use crate::cube::{CubeSamples, LEAST_NORMAL_ALONG_LINE, Links, links};
 use crate::set_description::SetDescription;
 
 /// A layered depth cube without any order in space.

@@ -22,7 +22,7 @@ fn view(
     camera: &PinholeCamera,
     (method, planes): (ReconstructionMethod, ViewPlanes),
 ) -> Result<View, ReconstructionError> {
-    let shared = CommonSets { mirrors: Mirrors::default(), base };
+    let shared = CommonSets { base, ..CommonSets::default() };
     let views = reconstructor().reconstruct(ReconstructRequest {
         common: shared,
         planes,
@@ -141,7 +141,7 @@ fn set_of(stage: &Gathering) -> SampleSet {
 
 fn lit_view(set: &SampleSet, base: Option<&SampleSet>, stage: &Gathering, rays: (u32, u32)) -> View {
     let mirrors = Mirrors { cells: &[], reflections: rays.0, glossy_rays: rays.1 };
-    let shared = CommonSets { mirrors, base };
+    let shared = CommonSets { mirrors, base, ..CommonSets::default() };
     let views = reconstructor().reconstruct(ReconstructRequest {
         common: shared,
         planes: ViewPlanes::ALL,
@@ -180,7 +180,11 @@ fn a_scene_without_mirrors_looks_the_same_whether_reflections_are_followed_or_no
     let base = floor.stage.set(None);
     let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
     let [followed, plain] = [3, 0].map(|reflections| {
-        let shared = CommonSets { mirrors: Mirrors { reflections, ..Mirrors::default() }, base: Some(&base) };
+        let shared = CommonSets {
+            mirrors: Mirrors { reflections, ..Mirrors::default() },
+            base: Some(&base),
+            ..CommonSets::default()
+        };
         let cameras = [floor.stage.camera];
         reconstructor()
             .reconstruct(ReconstructRequest {
@@ -215,7 +219,11 @@ fn lobes_and_mirrors_beside_images_are_those_of_direct_drawing() {
     let base = stage.set(None);
     let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
     let made = |cameras: &[PinholeCamera], reflections, glossy_rays| {
-        let shared = CommonSets { mirrors: Mirrors { cells: &[], reflections, glossy_rays }, base: Some(&base) };
+        let shared = CommonSets {
+            mirrors: Mirrors { cells: &[], reflections, glossy_rays },
+            base: Some(&base),
+            ..CommonSets::default()
+        };
         reconstructor()
             .reconstruct(ReconstructRequest { common: shared, planes, ..ReconstructRequest::new(&set, cameras, CARVE) })
             .expect("views")

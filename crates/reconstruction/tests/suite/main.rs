@@ -4,6 +4,7 @@ mod antialias;
 mod background;
 mod base;
 mod batches;
+mod blocks;
 mod closed_form;
 mod holes_and_limits;
 mod layered;

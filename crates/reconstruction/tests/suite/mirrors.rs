@@ -56,7 +56,11 @@ impl Hall {
     fn view_beside(&self, base: Option<&SampleSet>, camera: &PinholeCamera, reflections: u32) -> View {
         let cells: Vec<MirrorCell<'_>> =
             self.cells.iter().map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect();
-        let common = CommonSets { mirrors: Mirrors { cells: &cells, reflections, glossy_rays: 0 }, base };
+        let common = CommonSets {
+            mirrors: Mirrors { cells: &cells, reflections, glossy_rays: 0 },
+            base,
+            ..CommonSets::default()
+        };
         reconstruct(&self.samples, common, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
 

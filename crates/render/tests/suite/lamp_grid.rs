@@ -114,7 +114,7 @@ fn maps_are_asked_as_the_twin_asks_them() {
     };
     let with_maps = DrawWork {
         visibility: Visibility::Rays,
-        lamp_maps: LampMaps { side_px: MAP_PX, samples: None },
+        lamp_maps: LampMaps { side_px: MAP_PX, ..LampMaps::default() },
         ..work(&on_device, "soft 4x4 by maps")
     };
     let words = bits(with_maps, &camera);
@@ -195,8 +195,10 @@ fn a_lamp_in_the_midst_of_the_scene_asks_rays_where_maps_end() {
 }
 
 #[test]
-fn light_by_samples_without_samples_is_refused() {
+fn light_by_samples_or_cube_without_them_is_refused() {
     let on_device = upload(&blocked_floor());
-    let drawn = device().1.draw_lamp_bits(work(&on_device, "soft 4x4 by samples"), &below());
-    assert!(matches!(drawn, Err(RenderError::LampSamples { .. })));
+    for lighting in ["soft 4x4 by samples", "soft 4x4 by cube"] {
+        let drawn = device().1.draw_lamp_bits(work(&on_device, lighting), &below());
+        assert!(matches!(drawn, Err(RenderError::LampSamples { .. })), "{lighting}");
+    }
 }

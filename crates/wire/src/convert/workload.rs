@@ -10,7 +10,7 @@ use super::Convert;
 use crate::error::WireError;
 use crate::proto;
 
-enums! { Policy { Pipeline, Direct, TimeShare } CommonKind { Mirrors, Base } }
+enums! { Policy { Pipeline, Direct, TimeShare } CommonKind { Mirrors, Base, Block } }
 
 messages! {
     SceneRef = SceneRef { package_bytes; hash: scene_hash }, then SceneRef::validate;

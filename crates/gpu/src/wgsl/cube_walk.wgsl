@@ -31,14 +31,21 @@ const NO_ENTRY: u32 = 0xffffffffu;
 // Two entries a texel.
 @group(0) var cube_entries: texture_2d<u32>;
 
+// The parameter of a ray that meets nothing.
+const BEYOND_CUBE: f32 = 3.0e38;
+
 struct CubeRay { origin: vec3f, direction: vec3f }
 
+fn in_cube(v: vec4f) -> vec3f {
+    return vec3f(dot(cube.cube_from_world[0], v), dot(cube.cube_from_world[1], v), dot(cube.cube_from_world[2], v));
+}
+
 fn cube_ray(origin_in_world: vec3f, direction_in_world: vec3f) -> CubeRay {
-    let direction = homogeneous(cube.cube_from_world, vec4f(direction_in_world, 0.0));
+    let direction = in_cube(vec4f(direction_in_world, 0.0));
     let least = length(direction) * 1e-7;
     // No component may be 0: 0 · inf is NaN.
     let walked = select(direction, vec3f(least), abs(direction) < vec3f(least));
-    return CubeRay(homogeneous(cube.cube_from_world, vec4f(origin_in_world, 1.0)), walked);
+    return CubeRay(in_cube(vec4f(origin_in_world, 1.0)), walked);
 }
 
 // What a ray meets at `t`: a sample, the axis of its line, and the way from the sample to the place. `is_empty`: it meets nothing.
@@ -88,8 +95,8 @@ fn mask_ahead(within: vec3u, rises: vec3<bool>) -> vec2u {
     return in_layers.xz | (in_layers.yw << vec2u(16u));
 }
 
-// The nearest surface on a ray, from `near` on.
-fn walk(from_eye: CubeRay, near: f32) -> CubeHit {
+// The nearest surface on a ray, from `near` to `far`.
+fn walk(from_eye: CubeRay, near: f32, far: f32) -> CubeHit {
     let inverse = 1.0 / from_eye.direction;
     let a = -from_eye.origin * inverse;
     let b = (vec3f(cube.size) - from_eye.origin) * inverse;
@@ -97,7 +104,7 @@ fn walk(from_eye: CubeRay, near: f32) -> CubeHit {
     let upper = max(a, b);
     let start = max(max(lower.x, lower.y), max(lower.z, near));
     // The walk counts from where the ray comes into the cube: beside the way there a spacing may be less than a rounding.
-    let end = min(min(upper.x, upper.y), upper.z) - start;
+    let end = min(min(upper.x, upper.y), min(upper.z, far)) - start;
     let ray = CubeRay(from_eye.origin + from_eye.direction * start, from_eye.direction);
     let from_face = -ray.origin * inverse;
     let nudge = WALK_NUDGE * inverseSqrt(dot(ray.direction, ray.direction));
@@ -109,7 +116,7 @@ fn walk(from_eye: CubeRay, near: f32) -> CubeHit {
     // A place on a face belongs to the voxel that the ray goes into.
     let into_voxel = (ahead * 2.0 - 1.0) * WALK_NUDGE;
     var t = nudge;
-    var hit = CubeHit(false, false, FAR_AWAY, 0u, 0u, vec3f(0.0));
+    var hit = CubeHit(false, false, BEYOND_CUBE, 0u, 0u, vec3f(0.0));
     var cell = Cell(vec3i(-1), 0, vec2u(0u), 0u);
     var step = 0u;
     while t < end && step < MAX_CUBE_STEPS && !hit.met {
@@ -171,7 +178,7 @@ fn place_of_entry(words: vec2u) -> vec3f {
     return select(vec3f(bits_of_entry(words)) + 0.5, vec3f(depth), is_axis(words));
 }
 
-// The nearer of what is met and of where the ray meets an entry's plane from its front, or from both sides, from `near` on and within the
+// The nearer of what is met and of where the ray meets an entry's plane from a side that is seen, from `near` on and within the
 // line's square.
 fn nearer_of(nearest: Met, in_voxel: CubeRay, words: vec2u, near: f32) -> Met {
     let way = place_of_entry(words) - in_voxel.origin;
@@ -183,8 +190,12 @@ fn nearer_of(nearest: Met, in_voxel: CubeRay, words: vec2u, near: f32) -> Met {
     let off = abs(in_voxel.direction * t - way);
     let is_along = is_axis(words);
     let is_within = all((off <= vec3f(SQUARE_REACH)) | is_along);
-    let has_other_side = any(is_along & (bits_of_entry(words) != vec3u(0u)));
-    let is_met = (facing < 0.0 || has_other_side) && t >= near && t < nearest.t && is_within;
+{%- if meets_both_sides is defined and meets_both_sides %}
+    let is_seen = true;
+{%- else %}
+    let is_seen = facing < 0.0 || any(is_along & (bits_of_entry(words) != vec3u(0u)));
+{%- endif %}
+    let is_met = is_seen && t >= near && t < nearest.t && is_within;
     let side = vec2u(words.x + select(0u, 1u, facing > 0.0), words.y);
     return Met(select(nearest.t, t, is_met), select(nearest.words, side, is_met));
 }
