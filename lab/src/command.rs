@@ -33,7 +33,7 @@ pub enum LabCommand {
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
     /// Repeats the experiment of Lages et al.: total time against the number of views, the time of each stage, and K
-    Lages(LagesArgs),
+    Lages(Box<LagesArgs>),
     /// Measures how well methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
     Sampling(SamplingArgs),
     /// Draws how methods fail, as curves, and checks their shapes

@@ -89,13 +89,18 @@ impl Run {
         self.complete_s.get(..=set).map_or(f64::NAN, |sets| sets.iter().copied().fold(0.0, f64::max))
     }
 
-    /// T once the first sets have filled the cluster. The last ones do not count: while they are made nothing is sampled
-    /// ahead.
+    /// T once the first sets have filled the cluster, by the order in which sets end. The last ones do not count: while they are made
+    /// nothing is sampled ahead.
     #[must_use]
     pub fn steady_period_s(&self) -> f64 {
-        let last = self.complete_s.len().saturating_sub(1 + DRAINING);
+        let mut ends_s = self.complete_s.clone();
+        ends_s.sort_by(f64::total_cmp);
+        let last = ends_s.len().saturating_sub(1 + DRAINING);
         let first = last / 2;
-        (self.set_complete_s(last) - self.set_complete_s(first)) / last.saturating_sub(first) as f64
+        match ends_s.get(first..=last) {
+            Some([begin_s, .., end_s]) => (end_s - begin_s) / (last - first) as f64,
+            _ => f64::NAN,
+        }
     }
 
     /// The limit: the part that is busy for the greatest share of T.

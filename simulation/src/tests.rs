@@ -201,3 +201,15 @@ fn a_run_of_a_thousand_nodes_is_quick_and_deterministic() {
     assert!(first.complete_s.iter().all(|at_s| at_s.is_finite()));
     assert!(planned.assignment.policy != Policy::Direct);
 }
+
+/// Two nodes sample for all and make views, too: their own views wait, and sets end long after those that begin later.
+#[test]
+fn sets_that_end_late_have_a_period() {
+    let costs = Costs { sample_image_s: 0.143, reconstruct_view_s: 0.026, load_set_s: 0.002, ..COSTS };
+    let cluster = Cluster { images: 2, ..equal(11, Machine { costs, ..FREE }) };
+    let run =
+        ran(&cluster, &Demand { nodes_report: true, ..demand(PolicyChoice::TimeShare, 24, 17) }, Habits::default());
+    assert!(run.complete_s[1] > run.complete_s[9], "{:?}", run.complete_s);
+    let work_s = (2.0 * 0.143 + 24.0 * 0.027) / 11.0;
+    assert!((work_s..3.0 * work_s).contains(&run.steady_period_s()), "{} {work_s}", run.steady_period_s());
+}

@@ -47,7 +47,7 @@ pub(crate) enum LampImages {
     /// The quads of each rectangle's images; `None` for other lamps.
     Quads(Vec<Option<DepthQuads>>),
     /// A layered cube of the scene.
-    Cube(SampleSet),
+    Cube(Box<SampleSet>),
 }
 
 /// The images that were used last, at the end.
@@ -158,7 +158,7 @@ pub(crate) enum LampError {
 impl<'e> LampPipelines<'e> {
     fn sample(self, of: LampScene<'_>, moment: &Moment) -> Result<LampImages, LampError> {
         match moment.by_cube {
-            true => self.sample_cube(of, moment.sampling.side_px).map(LampImages::Cube),
+            true => self.sample_cube(of, moment.sampling.side_px).map(|cube| LampImages::Cube(cube.into())),
             false => self.sample_rectangles(of, moment.sampling).map(LampImages::Quads),
         }
     }
