@@ -38,10 +38,9 @@ impl CommonCell {
     /// # Errors
     /// For too many mirrors, bases or blocks, blocks beside others, and values that no peer may send.
     pub(crate) fn check_all(cells: &[Self]) -> Result<(), InvalidField> {
-        let count = |kind| cells.iter().filter(|cell| cell.kind == kind).count();
-        at_most(count(CommonKind::Mirrors), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
-        at_most(count(CommonKind::Base), 1, "common_cells of a base")?;
-        let blocks = count(CommonKind::Block);
+        at_most(count_of(cells, CommonKind::Mirrors), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
+        at_most(count_of(cells, CommonKind::Base), 1, "common_cells of a base")?;
+        let blocks = count_of(cells, CommonKind::Block);
         at_most(blocks, MAX_BLOCKS, "common_cells of blocks")?;
         if blocks > 0 && blocks < cells.len() {
             let given = format!("{} beside {blocks} of blocks", cells.len() - blocks);
@@ -67,6 +66,10 @@ impl CommonCell {
             Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected))
         })
     }
+}
+
+fn count_of(cells: &[CommonCell], kind: CommonKind) -> usize {
+    cells.iter().filter(|cell| cell.kind == kind).count()
 }
 
 /// Checks that cameras are the three of one layered cube, each with a row for every tile; after them may come some of light fields.

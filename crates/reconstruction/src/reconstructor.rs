@@ -8,7 +8,7 @@ use glam::Vec2;
 use gpu::{BufferPool, Frame, Gpu, JobLimit, PassCache, Submitted, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::blocks::BlockVisits;
+use crate::blocks;
 use crate::bounce::{self, Bounces, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
 use crate::in_flight::{BatchViews, submit};
@@ -199,15 +199,16 @@ impl Reconstructor {
         let cells = followed[0].cells.len() + common.blocks.len();
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), cells));
         let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
-        recording.blocks = BlockVisits::lend(&self.device, common.blocks, &cameras[0], recording.batch.plane_bytes);
+        recording.lend_blocks(common.blocks);
         let rays = recording.batch.plane_bytes as usize / 4;
         let [mirrors, lobes] =
             followed.map(|mirrors| Bounces::lend(&self.device, mirrors, rays, CurvedSearch::default()));
         let bounces = [mirrors?, lobes?];
         let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
         self.record_positions(prepared, &mut recording)?;
-        let visits = recording.blocks.take().into_iter().flat_map(BlockVisits::into_memory);
-        recording.batch.lent = bounces.into_iter().flatten().flat_map(Bounces::into_memory).chain(visits).collect();
+        let of_blocks = recording.blocks.take().map(|blocks| [blocks.listed, blocks.unknown]);
+        let of_bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory);
+        recording.batch.lent = of_bounces.chain(of_blocks.into_iter().flatten()).collect();
         Ok(recording)
     }
 
@@ -267,7 +268,7 @@ impl Reconstructor {
     ) -> Result<(), ReconstructionError> {
         let Prepared { request: ReconstructRequest { method, .. }, base, mesh, bounces: [bounces, lobes], .. } =
             prepared;
-        let unknown_in_blocks = BlockVisits::record(recording, &self.drawing, method)?;
+        let unknown_in_blocks = blocks::record(recording, &self.drawing, method)?;
         let listed = unknown_in_blocks.as_ref().or(listed);
         let unknown = method.record(&self.drawing, mesh, recording, listed, bounces)?;
         if method.walks_cube() {

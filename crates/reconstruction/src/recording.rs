@@ -13,10 +13,10 @@ use gpu::{
 };
 use wgpu::BufferUsages;
 
-use crate::blocks::{BlockVisits, front_to_back};
+use crate::quads::QuadTargets;
+use crate::sample_set::{SampleSet, front_to_back};
 use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, TILE_PX};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
-use crate::{quads::QuadTargets, sample_set::SampleSet};
 
 /// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, 8 more with blocks, up to 12 on the host.
 pub(crate) const PIXELS_A_BATCH: usize = 1 << 20;
@@ -34,11 +34,18 @@ pub(crate) struct Recording<'r> {
     pub device: &'r Device,
     pub set: &'r SampleSet,
     /// What comes before the set, where the scene has blocks.
-    pub blocks: Option<BlockVisits<'r>>,
+    pub blocks: Option<VisitedBlocks<'r>>,
     pub frame: Frame<'r>,
     pub batch: Batch,
     /// The family of the passes, whose costs are learned.
     family: u64,
+}
+
+/// The blocks of a batch whose views all see them in one order, and memory for lists of rays.
+pub(crate) struct VisitedBlocks<'r> {
+    pub front_to_back: Vec<&'r SampleSet>,
+    pub listed: PooledBuffer,
+    pub unknown: PooledBuffer,
 }
 
 /// Some rows of a view.
@@ -140,6 +147,15 @@ impl<'r> Recording<'r> {
         let cameras: Vec<_> = centers.iter().map(|camera| camera.with_offset(offset_px)).collect();
         self.batch.works = works(self.device, self.set, &cameras, pieces, *planes);
         self.batch.cameras = cameras;
+    }
+
+    /// Lends what visits to blocks need; nothing without blocks.
+    pub fn lend_blocks(&mut self, blocks: &[&'r SampleSet]) {
+        let numbers = front_to_back(blocks, &self.batch.centers[0]);
+        let [listed, unknown] = ["pixels whose rays cross a block", "pixels unknown in blocks"]
+            .map(|label| self.device.buffers.lend_storage(label, self.batch.plane_bytes));
+        let front_to_back = numbers.into_iter().map(|number| blocks[number]).collect();
+        self.blocks = (!blocks.is_empty()).then_some(VisitedBlocks { front_to_back, listed, unknown });
     }
 
     /// Records what follows for another set's images.
@@ -286,10 +302,8 @@ pub(crate) fn batches<'c>(
     most_pixels: usize,
     blocks: &[&SampleSet],
 ) -> impl Iterator<Item = &'c [PinholeCamera]> {
-    let is_alike = |a: &PinholeCamera, b: &PinholeCamera| {
-        a.size_px == b.size_px && front_to_back(blocks, a) == front_to_back(blocks, b)
-    };
-    cameras.chunk_by(is_alike).flat_map(move |run| {
+    let alike = cameras.chunk_by(|a, b| a.size_px == b.size_px && front_to_back(blocks, a) == front_to_back(blocks, b));
+    alike.flat_map(move |run| {
         let views = (most_pixels / run[0].pixel_count()).clamp(1, MAX_VIEWS_A_BATCH);
         run.chunks(views)
     })

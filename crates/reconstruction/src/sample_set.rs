@@ -57,10 +57,10 @@ impl SampleSet {
         self.cube.as_ref().map(|cube| &cube.bricks)
     }
 
-    /// The squared distance of a place from the volume that is searched.
-    pub(crate) fn distance_squared_m2(&self, place_in_world: Vec3) -> f32 {
+    /// The distance of a place from the volume that is searched.
+    fn distance_m(&self, place_in_world: Vec3) -> f32 {
         let [min, max] = [self.volume.min_in_world, self.volume.max_in_world].map(Vec3::from);
-        place_in_world.distance_squared(place_in_world.clamp(min, max))
+        place_in_world.distance(place_in_world.clamp(min, max))
     }
 
     /// The tables of its images, and what these reflect.
@@ -136,6 +136,14 @@ impl SampleSet {
             cube: None,
         })
     }
+}
+
+/// The numbers of blocks, nearest first. Blocks are the cells of one grid: no ray comes to a nearer one after a farther one.
+pub(crate) fn front_to_back(blocks: &[&SampleSet], camera: &PinholeCamera) -> Vec<usize> {
+    let distances: Vec<f32> = blocks.iter().map(|block| block.distance_m(camera.eye_in_world)).collect();
+    let mut order: Vec<usize> = (0..blocks.len()).collect();
+    order.sort_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+    order
 }
 
 /// One image, as shaders see it.

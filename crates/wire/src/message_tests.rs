@@ -514,7 +514,7 @@ fn bad_mirror_cells_are_refused_by_field() {
     let cell = proto::CommonCell { bounds: None, sampling_method: "all".to_owned(), kind: 1 };
     assert!(spoilt(vec![cell.clone()]).contains("common_cells.bounds is missing"));
     assert!(spoilt(vec![proto::CommonCell { kind: 0, ..cell.clone() }]).contains("common_cells.kind"));
-    assert!(spoilt(vec![cell; 10]).contains("common_cells has 10"));
+    assert!(spoilt(vec![cell; 65]).contains("common_cells has 65"));
 }
 
 #[test]
