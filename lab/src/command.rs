@@ -54,7 +54,8 @@ pub enum StudyCommand {
     /// Measures how well images of a mirror's surroundings answer its rays
     ///
     /// Views of a teapot before a dented mirror are made with images of the mirror's surroundings, pinhole and single-pole images of
-    /// equal texels, and compared with direct drawing. Then single rays off the mirror are followed towards the teapot. --quick
+    /// equal texels, and compared with direct drawing. Then single rays off the mirror are followed towards the teapot. At last a
+    /// mirror teapot stands in a maze, which graph cameras, pinholes and a layered cube take images of. --quick
     /// takes six views in hard shadows, in place of 24 in soft light.
     Impostors(RunArgs),
     /// Repeats Table 1 of Lischinski and Rappoport: layered depth cubes, light fields, and both baselines

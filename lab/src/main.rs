@@ -15,6 +15,7 @@ mod delivery;
 mod evaluation;
 mod failures;
 mod fronts;
+mod graph;
 mod impostors;
 mod lages;
 mod layered;

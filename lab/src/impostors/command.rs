@@ -6,6 +6,7 @@ use render::Lighting;
 use report::{Bar, Check};
 use sampling::Impostors;
 
+use super::maze;
 use super::measure::{Figures, Hall, around};
 use super::single_rays::{self, Teapot};
 use super::walk;
@@ -60,6 +61,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     report.tables.push(table(single_rays::TITLE, &single_rays::COLUMNS, &rows)?);
     report.checks.extend(single_rays::checks(&rows)?);
     walk::measure(&teapot, &mut report)?;
+    maze::measure(&stand, args.quick, &mut report)?;
     args.finish("out/study/impostors", &report)
 }
 

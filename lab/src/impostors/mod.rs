@@ -1,6 +1,7 @@
 //! `myriorama-lab study impostors`: how well images of a mirror's surroundings answer its rays (Rosen et al.).
 
 pub mod command;
+mod maze;
 mod measure;
 mod objects;
 mod single_rays;
