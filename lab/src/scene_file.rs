@@ -13,7 +13,7 @@ use scene::{Limits, MissingTextures, SceneSpec};
 #[command(after_help = "Example: myriorama-lab scene bird-nest --out bird-nest.glb")]
 pub struct SceneFileArgs {
     /// A fixture (quad, unit-cube, uv-sphere, checker-sphere, poles, blocks, bird-nest, tree, teapot-mirror, mirror-pair,
-    /// mirror-box, teapot-floor, teapot-spheres), or a scene that the program takes
+    /// mirror-box, teapot-floor, teapot-spheres, glass), or a scene that the program takes
     #[arg(value_name = "NAME")]
     scene: SceneSpec,
     /// The file
