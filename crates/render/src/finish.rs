@@ -74,9 +74,10 @@ impl ShaderVariant for Finish {
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, lit, environment_map, output } = *self;
         let Output { sums, samples, mirrors, glossy, passed: redundancy, .. } = output;
+        let reflected = output.follows_rays();
         let PlaneLayout { normal, reflector, surface_id, passed, light, count, .. } = output.layout();
         context! {
-            by_rays, single_pole, lit, environment_map, samples, mirrors, glossy, redundancy,
+            by_rays, single_pole, lit, environment_map, samples, mirrors, reflected, glossy, redundancy,
             highlight => output.highlight.map(highlight_name),
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
@@ -96,6 +97,7 @@ impl ShaderVariant for Finish {
                 views.push(output);
                 if highlight == Some(Highlight::Ggx) {
                     views.extend([false, true].map(|glossy| Output { mirrors: true, glossy, ..output }));
+                    views.push(Output { glass: true, ..output });
                 }
             }
         }

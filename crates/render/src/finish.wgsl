@@ -27,8 +27,8 @@
 {% if highlight %}
 @group(0) var<uniform> illumination: Illumination;
 {% endif %}
-{%- if mirrors %}
-// Red, green and blue of each pixel: linear light that mirrored rays bring.
+{%- if reflected %}
+// Red, green and blue of each pixel: linear light that followed rays bring.
 @group(0) var<storage, read> reflected: array<f32>;
 {%- endif %}
 {% if surface_id %}
@@ -158,11 +158,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place, {{ "0.0" if glossy else "open" }});
 {% endfor %}
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
-{%- if mirrors %}
+    }
+{%- if reflected %}
+    // Glass of no reflectance has no highlight.
+    for (var followed = met; followed; followed = false) {
         let first = 3u * (camera.first_word / {{ plane_count }}u + place);
         linear += vec3f(reflected[first], reflected[first + 1u], reflected[first + 2u]);
-{%- endif %}
     }
+{%- endif %}
 {% endif %}
 {% if not light %}    for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
 {% endif %}{% if light %}{% elif samples and averaged %}

@@ -225,6 +225,11 @@ impl GpuScene {
         self.highlights[usize::from(highlight == Highlight::Ggx)]
     }
 
+    /// Whether light goes through some surface.
+    pub(crate) fn has_glass(&self) -> bool {
+        self.rays.traversal.glass
+    }
+
     /// Instances counted each.
     pub(crate) fn triangle_count(&self) -> usize {
         self.draws.iter().map(|draw| draw.indices.len() / 3).sum()
@@ -338,7 +343,7 @@ impl MaterialTraits {
     fn of(material: &Material) -> Self {
         let mapped = material.is_mapped();
         Self {
-            double_sided: material.double_sided,
+            double_sided: material.has_two_sides(),
             alpha_tested: material.is_alpha_tested(),
             textured: mapped || material.base_color_texture.is_some(),
             coat_textured: mapped || material.metallic_roughness_texture.is_some(),

@@ -76,16 +76,21 @@ fn incident_of(number: u32, spot: Spot, place: vec2f) -> Incident {
 }
 {% if traced %}
 
-// What arrives of it.
+// The share of a ray that arrives: what is not blocked, less what glass on the way takes.
+fn open_share(ray: Ray, t_max: f32) -> vec3f {
+    let blocked = is_blocked(ray, t_max);
+    return select({{ "passed_linear" if glass else "vec3f(1.0)" }}, vec3f(0.0), blocked);
+}
+
+// What arrives of it. Green stands for the open share of all colours.
 fn arrival_of(incident: Incident, spot: Spot) -> Arrival {
     let cosine = dot(spot.normal, incident.towards);
-    var open = 0.0;
+    var open = vec3f(0.0);
     // A loop, not a branch: the software device skips only loops that no lane needs.
     for (var lit = cosine > 0.0 && any(incident.irradiance_linear > vec3f(0.0)); lit; lit = false) {
-        let blocked = is_blocked(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
-        open = select(1.0, 0.0, blocked);
+        open = open_share(ray_from(spot.origin, incident.towards), incident.distance_m - spot.bias_m);
     }
-    return Arrival(incident.irradiance_linear * (max(cosine, 0.0) * open), open);
+    return Arrival(incident.irradiance_linear * (max(cosine, 0.0) * open), open.g);
 }
 {% endif %}
 
@@ -153,9 +158,9 @@ fn from_environment(spot: Spot, ambient_rays: u32) -> Arrival {
         arrival.open += ray.open;
     }
 {% else %}
-        let open = select(1.0, 0.0, is_blocked(ray_from(spot.origin, towards), camera.occlusion_radius_m));
+        let open = open_share(ray_from(spot.origin, towards), camera.occlusion_radius_m);
         arrival.linear += {{ "environment_base" if environment_map else "environment_radiance" }}(towards) * open;
-        arrival.open += open;
+        arrival.open += open.g;
     }
 {% endif %}
 {% if environment_map and not shadows %}

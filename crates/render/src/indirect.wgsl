@@ -3,6 +3,10 @@
 
 // The growth of a ray's cone in a metre, for its textures: that of one of fifty rays over a hemisphere.
 const INDIRECT_SPREAD: f32 = 0.25;
+{%- if glass %}
+// The light that glass takes is asked for up to so much before what the ray meets.
+const INDIRECT_SLACK: f32 = 1e-4;
+{%- endif %}
 // Weights have a finite sum.
 const MOST_WEIGHT: f32 = 1e30;
 
@@ -51,10 +55,18 @@ fn sent_back(ray: Ray, hit: Hit, seen_from: Spot, number: u32) -> vec3f {
 // What the ray of this number brings, and whether it is open to the environment.
 fn indirect_ray(spot: Spot, towards: vec3f, number: u32) -> Arrival {
     let ray = ray_from(spot.origin, towards);
+{%- if glass %}
+    // Straight through glass, as rays to lamps.
+    ignores_glass = true;
+{%- endif %}
     let hit = closest(ray, 0.0, PARALLEL_M);
     var arrival = Arrival({{ "environment_base" if environment_map else "environment_radiance" }}(towards), 1.0);
     for (var met = hit.slot != NOTHING; met; met = false) {
         arrival = Arrival(sent_back(ray, hit, spot, number), 0.0);
     }
+{%- if glass %}
+    _ = is_blocked(ray, hit.t * (1.0 - INDIRECT_SLACK));
+    arrival = Arrival(arrival.linear * passed_linear, arrival.open * passed_linear.g);
+{%- endif %}
     return arrival;
 }

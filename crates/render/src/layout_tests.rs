@@ -182,6 +182,7 @@ fn a_bounce_has_the_wgsl_layout() {
         curvature_per_m,
         met,
         near_m,
+        unmirrored,
         padding
     });
     assert_eq!(shader(&parsed(&Spawn::all().remove(0)), "Bounce"), host);

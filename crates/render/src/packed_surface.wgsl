@@ -41,3 +41,11 @@ fn mapped_normal(texel: vec3f, scale: f32, normal: vec3f, tangent: vec4f) -> vec
     let bitangent = cross(normal, tangent.xyz) * tangent.w;
     return normalize(tangent.xyz * local.x + bitangent * local.y + normal * local.z + normal * 1e-6);
 }
+{% if marks_glass is defined and marks_glass %}
+
+// A surface that sends on a share of the light in place of scattering it.
+fn seen_through(surface: vec4u, transmission: f32) -> vec4u {
+    let scattered_linear = albedo_linear(surface.x) * (1.0 - transmission);
+    return vec4u(packed_albedo(scattered_linear, false) | (surface.x & OCCLUDED), surface.y, surface.z | SEEN_THROUGH, surface.w);
+}
+{% endif %}

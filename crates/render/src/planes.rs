@@ -24,6 +24,8 @@ pub(crate) struct Output {
     pub mirrors: bool,
     /// Rays of lobes bring what mirrors do not show.
     pub glossy: bool,
+    /// Glass of a view shows what is behind it.
+    pub glass: bool,
     pub normal: bool,
     pub reflector: bool,
     pub surface_id: bool,
@@ -60,6 +62,11 @@ impl Output {
     pub fn of(work: DrawWork<'_>, reflects: bool) -> Self {
         let visibility = reflects && work.lighting.is_traced();
         Self { sums: SumPlanes { light_count: work.scene.light_count, visibility }, ..Self::default() }
+    }
+
+    /// Whether rays bring light to pixels from beyond their surfaces.
+    pub fn follows_rays(&self) -> bool {
+        self.mirrors || self.glass
     }
 
     /// Words of packed shares of light.

@@ -3,8 +3,8 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{
-    Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightCacheQuality, LightFieldCamera,
-    LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+    Antialias, Camera, DepthImage, Highlight, LayeredDepthImage, LayeredLightField, LightCacheQuality,
+    LightFieldCamera, LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
 use glam::UVec2;
 use gpu::{Gpu, GpuError, Pool, TablePool, Templates, Turn, WorkClass};
@@ -391,6 +391,8 @@ impl Renderer {
         let by_rays = match work.visibility {
             // Triangles are drawn through one eye.
             _ if cameras[0].pinhole().is_none() => true,
+            // Rays mark the pixels that show glass.
+            _ if request.output.glass => true,
             _ if sequence.is_some_and(|sequence| sequence.known.test.traces_rays()) => true,
             Visibility::Triangles => false,
             Visibility::Rays => true,
@@ -450,7 +452,8 @@ fn views_output(work: DrawWork<'_>) -> Output {
     let highlight = work.highlight();
     let glossy = highlight.is_some() && work.lighting.glossy_rays() > 0;
     let mirrors = highlight.is_some() && work.lighting.without_reflections().is_some();
-    Output { highlight, mirrors, glossy, ..Output::of(work, highlight.is_some()) }
+    let glass = highlight == Some(Highlight::Ggx) && work.scene.has_glass();
+    Output { highlight, mirrors, glossy, glass, ..Output::of(work, highlight.is_some()) }
 }
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes) -> Output {

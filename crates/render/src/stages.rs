@@ -61,10 +61,11 @@ impl Stages {
         let sums = self.sums(batch)?;
         let Self { gpu, passes, pool, .. } = self;
         let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
-        let most_px = if batch.output.mirrors { reflections::PIXELS_A_PIECE } else { u64::MAX };
+        let most_px = if batch.output.follows_rays() { reflections::PIXELS_A_PIECE } else { u64::MAX };
         let pieces = Piece::all(batch.cameras, slice_px.min(most_px));
         let most_rays = pieces.iter().map(Piece::pixel_count).max().unwrap_or(0).max(1);
-        let mirrored = batch.output.mirrors.then(|| Reflections::lend(gpu, pool, batch, most_rays, batch.bytes(1)));
+        let follows_rays = batch.output.follows_rays();
+        let mirrored = follows_rays.then(|| Reflections::lend(gpu, pool, batch, most_rays, batch.bytes(1)));
         let mirrored = mirrored.transpose()?;
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let shifted = batch.positions();

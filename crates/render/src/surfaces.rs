@@ -15,6 +15,10 @@ pub(crate) const TRIANGLE_NORMAL_FORMAT: TextureFormat = TextureFormat::R32Uint;
 /// All bits of a word: no instance has this number, and no triangle.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
+/// The bit of a surface's normal that says that light goes through, where pixels with glass are marked: the last of the vector's first
+/// number.
+pub(crate) const SEEN_THROUGH: u32 = 1;
+
 /// The most bytes of free textures: those of a few batches.
 pub(crate) const MOST_FREE_BYTES: u64 = 128 << 20;
 

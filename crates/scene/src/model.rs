@@ -218,6 +218,35 @@ pub struct Material {
     pub double_sided: bool,
     /// The colour is independent of light (`KHR_materials_unlit`).
     pub unlit: bool,
+    /// Share of the light that enters the surface and goes through it, tinted by the base colour, 0 to 1. Metals transmit
+    /// nothing.
+    pub transmission: f32,
+    /// Refractive index of what transmits, 1 to [`MAX_IOR`].
+    pub ior: f32,
+    /// The medium that a transmissive surface encloses; light goes straight through surfaces without one.
+    pub volume: Option<Volume>,
+}
+
+/// The medium inside a closed surface. White light that has gone through `attenuation_distance_m` of it has the attenuation
+/// colour (Beer and Lambert).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Volume {
+    /// Linear RGB, 0 to 1.
+    pub attenuation_color_linear: Vec3,
+    /// Above 0; infinite in a medium that takes no light.
+    pub attenuation_distance_m: f32,
+}
+
+impl Volume {
+    /// A medium that takes no light.
+    pub const CLEAR: Self = Self { attenuation_color_linear: Vec3::ONE, attenuation_distance_m: f32::INFINITY };
+
+    /// The exponent of what a metre takes, finite and at least 0.
+    #[must_use]
+    pub fn absorption_per_m(&self) -> Vec3 {
+        let color = self.attenuation_color_linear.max(Vec3::splat(LEAST_ATTENUATION));
+        color.map(|share| (-share.ln() / self.attenuation_distance_m).clamp(0.0, MAX_ABSORPTION_PER_M))
+    }
 }
 
 impl Default for Material {
@@ -242,12 +271,30 @@ impl Default for Material {
             alpha_hashed: false,
             double_sided: false,
             unlit: false,
+            transmission: 0.0,
+            ior: DEFAULT_IOR,
+            volume: None,
         }
     }
 }
 
+/// The refractive index of glTF 2.0 where a file names none.
+pub const DEFAULT_IOR: f32 = 1.5;
+/// The greatest refractive index; that of germanium, 4, is among the greatest of known materials.
+pub const MAX_IOR: f32 = 4.0;
+/// An attenuation colour of 0 counts as this: its logarithm is finite.
+const LEAST_ATTENUATION: f32 = 1e-6;
+/// A thicker medium lets nothing through a micrometre.
+const MAX_ABSORPTION_PER_M: f32 = 1e9;
+
 /// Reflectance at normal incidence of a dielectric with a refractive index of 1.5, as in glTF 2.0.
 pub const DIELECTRIC_REFLECTANCE: f32 = 0.04;
+
+/// The share of light that a surface of a refractive index reflects at normal incidence.
+#[must_use]
+pub fn reflectance_of_ior(ior: f32) -> f32 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
+}
 
 /// See [`Material::is_specular`].
 const LEAST_MATT_ROUGHNESS: f32 = 0.95;
@@ -266,12 +313,27 @@ impl Material {
     /// Returns whether the material has a visible highlight under GGX. Samples keep view-dependent light apart, at a
     /// cost that a scene should pay only where it needs it. A dielectric of roughness 0.95 or more reflects about a
     /// hundredth of a white surface's light, and counts as matt. A roughness texture always counts as visible, because
-    /// it may vary.
+    /// it may vary. A transmissive surface is specular whatever its roughness.
     #[must_use]
     pub fn is_specular(&self) -> bool {
+        if self.is_transmissive() {
+            return true;
+        }
         let reflects = self.metallic > 0.0 || self.dielectric_reflectance_linear.max_element() > 0.0;
         let is_smooth_or_metal = self.metallic > 0.0 || self.roughness < LEAST_MATT_ROUGHNESS;
         !self.unlit && reflects && (is_smooth_or_metal || self.metallic_roughness_texture.is_some())
+    }
+
+    /// Returns whether light goes through the surface.
+    #[must_use]
+    pub fn is_transmissive(&self) -> bool {
+        !self.unlit && self.transmission > 0.0 && self.metallic < 1.0
+    }
+
+    /// Returns whether backs are met: those of a surface around a volume are where light leaves it.
+    #[must_use]
+    pub fn has_two_sides(&self) -> bool {
+        self.double_sided || self.is_transmissive() && self.volume.is_some()
     }
 
     /// Its textures: base colour, metallic and roughness, normals, emission, occlusion.

@@ -19,7 +19,7 @@ use crate::{Fault, Limits, Scene, SceneError, at_most};
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
 
 const MAGIC: &[u8; 8] = b"MYRSCENE";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// A scene without its large arrays, the lengths of each mesh's vertices, details and indices, and the size of the
 /// environment map.

@@ -6,9 +6,9 @@ use depth_image::LightError;
 use glam::{Affine3A, Quat, Vec3};
 
 use crate::{
-    Animation, Channel, Fault, Influence, Light, Limits, MAX_COORDINATE_M, Material, Mesh, MeshPart, MovingInstance,
-    Node, NodeTransform, Property, Scene, SceneError, SourceCamera, Texture, TextureUse, TransformParts, Vertex,
-    VertexDetail, Wind, at_most,
+    Animation, Channel, Fault, Influence, Light, Limits, MAX_COORDINATE_M, MAX_IOR, Material, Mesh, MeshPart,
+    MovingInstance, Node, NodeTransform, Property, Scene, SceneError, SourceCamera, Texture, TextureUse,
+    TransformParts, Vertex, VertexDetail, Volume, Wind, at_most,
 };
 
 /// Smallest determinant relative to the cube of the largest column that counts as invertible.
@@ -211,7 +211,18 @@ fn check_material(material: &Material, textures: &[Texture]) -> Result<(), Strin
     let reflectance = material.dielectric_reflectance_linear;
     ensure(reflectance.to_array().into_iter().all(is_share), || "bad dielectric reflectance".into())?;
     let phong = [material.phong_specular, material.phong_exponent, material.alpha_cutoff];
-    ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())
+    ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())?;
+    check_transmission(material)
+}
+
+fn check_transmission(material: &Material) -> Result<(), String> {
+    ensure(is_share(material.transmission), || "transmission is not from 0 to 1".into())?;
+    ensure((1.0..=MAX_IOR).contains(&material.ior), || format!("ior {} is not from 1 to {MAX_IOR}", material.ior))?;
+    let Some(Volume { attenuation_color_linear, attenuation_distance_m }) = material.volume else { return Ok(()) };
+    let is_color = attenuation_color_linear.to_array().into_iter().all(is_share);
+    ensure(is_color, || "attenuation colour is not from 0 to 1".into())?;
+    // Infinity passes, NaN does not.
+    ensure(attenuation_distance_m > 0.0, || format!("attenuation distance {attenuation_distance_m} is not above 0"))
 }
 
 fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {

@@ -17,16 +17,20 @@ use crate::motion::Motion;
 pub const ALPHA_TESTED: u32 = 1 << 31;
 /// Flag of a triangle whose back is seen too.
 pub const DOUBLE_SIDED: u32 = 1 << 30;
+/// Flag of a triangle that light goes through.
+pub const GLASS: u32 = 1 << 29;
 /// Flag of a triangle that is shown as it is, whatever the light.
-pub const UNLIT: u32 = 1 << 29;
+pub const UNLIT: u32 = 1 << 28;
 /// Flag of a triangle that has highlights.
-pub const SPECULAR: u32 = 1 << 28;
+pub const SPECULAR: u32 = 1 << 27;
 /// Flag of a triangle whose alpha is compared with a hash of the place.
-pub const ALPHA_HASHED: u32 = 1 << 27;
+pub const ALPHA_HASHED: u32 = 1 << 26;
+/// Flag of a triangle of glass without a volume: light goes straight through.
+pub const THIN: u32 = 1 << 25;
 /// The flags that a ray needs before it has met a triangle.
-pub const CORNER_FLAGS: u32 = ALPHA_TESTED | DOUBLE_SIDED;
+pub const CORNER_FLAGS: u32 = ALPHA_TESTED | DOUBLE_SIDED | GLASS;
 /// The bits of a vertex' number, which shares a word with the flags.
-pub const VERTEX: u32 = (1 << 30) - 1;
+pub const VERTEX: u32 = (1 << 29) - 1;
 /// The most vertices that have a number.
 pub const MAX_VERTICES: u64 = VERTEX as u64 + 1;
 
@@ -85,7 +89,7 @@ pub struct FlatTriangle {
     pub primitive: u32,
     /// Into [`Scene::materials`].
     pub material: u32,
-    /// [`ALPHA_TESTED`], [`DOUBLE_SIDED`], [`UNLIT`], [`SPECULAR`] and [`ALPHA_HASHED`].
+    /// [`ALPHA_TESTED`], [`DOUBLE_SIDED`], [`GLASS`], [`UNLIT`], [`SPECULAR`], [`ALPHA_HASHED`] and [`THIN`].
     pub flags: u32,
 }
 
@@ -198,7 +202,9 @@ impl FlatScene {
 fn flags_of(material: &Material) -> u32 {
     (u32::from(material.is_alpha_tested()) * ALPHA_TESTED)
         | (u32::from(material.alpha_hashed) * ALPHA_HASHED)
-        | (u32::from(material.double_sided) * DOUBLE_SIDED)
+        | (u32::from(material.has_two_sides()) * DOUBLE_SIDED)
+        | (u32::from(material.is_transmissive()) * GLASS)
+        | (u32::from(material.volume.is_none()) * THIN)
         | (u32::from(material.unlit) * UNLIT)
         | (u32::from(material.is_specular()) * SPECULAR)
 }

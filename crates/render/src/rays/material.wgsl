@@ -18,7 +18,7 @@ struct Attributes {
 
 // Texels of a material: base colour; emission and alpha cutoff; metallic, roughness, reflector and the uses of textures;
 // dielectric reflectance and the normal map's scale; then, for each texture, its first texel and its packed size, with the
-// occlusion's strength after them.
+// occlusion's strength and the transmission after them; what a metre of the medium takes, and the refractive index.
 fn vertex_texel(corner: u32) -> vec4u { return textureLoad(flat_vertices, texel_at(corner & VERTEX), 0); }
 fn material_texel(material: u32, part: u32) -> vec4u { return textureLoad(materials, texel_at(material * MATERIAL_TEXELS + part), 0); }
 {% if mapped %}

@@ -22,6 +22,8 @@ pub(crate) struct Primary {
     triangle_normal: bool,
     /// Rays around a pole, in place of those through one eye.
     single_pole: bool,
+    /// Pixels that show glass are marked.
+    marks_glass: bool,
     redundancy: Option<RedundancyVariant>,
 }
 
@@ -41,9 +43,9 @@ impl ShaderVariant for Primary {
     const TEMPLATE: &'static str = "rays/primary.wgsl";
 
     fn context(&self) -> Value {
-        let Self { traversal, shading, surface_id, triangle_normal, single_pole, redundancy } = *self;
+        let Self { traversal, shading, surface_id, triangle_normal, single_pole, marks_glass, redundancy } = *self;
         context! {
-            primary => true, from_eye => true, surface_id, triangle_normal, single_pole,
+            primary => true, from_eye => true, surface_id, triangle_normal, single_pole, marks_glass,
             shading => shading.map_or("unlit", highlight_name),
             ..merge_maps([traversal.context(), RedundancyVariant::context(redundancy, KNOWN_GROUP)])
         }
@@ -57,6 +59,10 @@ impl ShaderVariant for Primary {
                 all.extend(Traversal::ALL.map(|traversal| Self { traversal, ..plain }));
             }
         }
+        let with_glass =
+            all.iter().filter(|variant| variant.traversal.glass && variant.shading == Some(Highlight::Ggx));
+        let marked: Vec<Self> = with_glass.map(|variant| Self { marks_glass: true, ..*variant }).collect();
+        all.extend(marked);
         all
     }
 }
@@ -77,6 +83,7 @@ pub(crate) fn record(
         surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
         triangle_normal: batch.output.triangle_normal,
         single_pole: batch.is_single_pole(),
+        marks_glass: batch.output.glass,
         redundancy: predecessors.map(|images| images.variant),
     };
     for (camera, target) in (first..).zip(surfaces) {

@@ -76,6 +76,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             base_color(triangle.z, at, footprints).rgb, emission(triangle.z, at, footprints),
             normal_at(triangle.z, at, footprints) * facing, coat(triangle.z, triangle.w, at, footprints),
         );
+{%- if marks_glass %}
+        surface.z &= ~SEEN_THROUGH;
+        for (var is_glass = (triangle.w & GLASS) != 0u; is_glass; is_glass = false) {
+            surface = seen_through(surface, glass_of(triangle, at, footprints).transmission);
+        }
+{%- endif %}
         ids = triangle.xy;
 {% if triangle_normal %}
         let corner = bitcast<vec3f>(corner_texel(hit.slot * 3u).xyz);

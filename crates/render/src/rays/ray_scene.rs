@@ -9,7 +9,7 @@ use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
 use parking_lot::Mutex;
 use rayon::prelude::*;
-use scene::{Material, Scene, Texture, TextureUse};
+use scene::{Material, Scene, Texture, TextureUse, Volume};
 use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
@@ -37,7 +37,7 @@ pub struct RayScene {
     pub(crate) flat: FlatScene,
     pub(crate) materials: Vec<[u32; 4]>,
     pub(crate) texels: Vec<[u8; 4]>,
-    traversal: Traversal,
+    pub(crate) traversal: Traversal,
     pub(crate) state: Mutex<Option<Built>>,
 }
 
@@ -218,10 +218,10 @@ impl Traced {
 }
 
 /// Texels of a material, which rays/material.wgsl lists.
-pub(crate) const MATERIAL_TEXELS: u32 = 7;
+pub(crate) const MATERIAL_TEXELS: u32 = 8;
 
 /// `places` are the first texel and the packed size of each texture.
-fn material_texels(material: &Material, places: &[[u32; 2]]) -> [[u32; 4]; 7] {
+fn material_texels(material: &Material, places: &[[u32; 2]]) -> [[u32; 4]; MATERIAL_TEXELS as usize] {
     let emission = Vec4::from((material.emissive_linear, material.alpha_cutoff));
     let dielectric = Vec4::from((material.dielectric_reflectance_linear, normal_scale(material)));
     let [[base, base_size], [coat, coat_size], [normal, normal_size], [emissive, emissive_size], [open, open_size]] =
@@ -229,6 +229,8 @@ fn material_texels(material: &Material, places: &[[u32; 2]]) -> [[u32; 4]; 7] {
     let uses = material.textures().map(|texture| texture.map_or(0, use_bits));
     let uses = uses.into_iter().rev().fold(0, |all, bits| all << 5 | bits);
     let strength = material.occlusion_strength.to_bits();
+    let absorption_per_m = material.volume.as_ref().map_or(Vec3::ZERO, Volume::absorption_per_m);
+    let medium = Vec4::from((absorption_per_m, material.ior));
     [
         material.base_color_linear.map(f32::to_bits),
         emission.to_array().map(f32::to_bits),
@@ -236,7 +238,8 @@ fn material_texels(material: &Material, places: &[[u32; 2]]) -> [[u32; 4]; 7] {
         dielectric.to_array().map(f32::to_bits),
         [base, base_size, coat, coat_size],
         [normal, normal_size, emissive, emissive_size],
-        [open, open_size, strength, 0],
+        [open, open_size, strength, material.transmission.to_bits()],
+        medium.to_array().map(f32::to_bits),
     ]
 }
 

@@ -19,13 +19,17 @@ pub(crate) struct Traversal {
     pub alpha_tested: bool,
     /// Some material needs more than the first coordinates of two repeated textures.
     pub mapped: bool,
+    /// Light goes through some triangles.
+    pub glass: bool,
 }
 
 impl Traversal {
-    pub const ALL: [Self; 3] = [
-        Self { stack: 16, alpha_tested: false, mapped: false },
-        Self { stack: 16, alpha_tested: true, mapped: false },
-        Self { stack: 16, alpha_tested: true, mapped: true },
+    pub const ALL: [Self; 5] = [
+        Self { stack: 16, alpha_tested: false, mapped: false, glass: false },
+        Self { stack: 16, alpha_tested: true, mapped: false, glass: false },
+        Self { stack: 16, alpha_tested: true, mapped: true, glass: false },
+        Self { stack: 16, alpha_tested: false, mapped: false, glass: true },
+        Self { stack: 16, alpha_tested: true, mapped: true, glass: true },
     ];
 
     /// The switches of a scene, without a stack as yet.
@@ -37,6 +41,7 @@ impl Traversal {
                 let mut textures = material.textures().into_iter().flatten();
                 material.is_mapped() || textures.any(|texture| texture.wrap != [Wrap::Repeat; 2])
             }),
+            glass: scene.materials.iter().any(Material::is_transmissive),
         }
     }
 
@@ -46,8 +51,8 @@ impl Traversal {
     }
 
     pub fn context(self) -> Value {
-        let Self { stack, alpha_tested, mapped } = self;
-        context! { stack, alpha_tested, mapped }
+        let Self { stack, alpha_tested, mapped, glass } = self;
+        context! { stack, alpha_tested, mapped, glass }
     }
 
     /// The values of shaders that follow rays off mirrors.

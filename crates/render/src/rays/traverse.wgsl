@@ -20,7 +20,9 @@ fn corner_texel(index: u32) -> vec4u { return textureLoad(triangle_corners, texe
 struct Ray { origin: vec3f, direction: vec3f, inverse: vec3f, octant4: u32 }
 
 fn ray_from(origin: vec3f, direction: vec3f) -> Ray {
-    let steep = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
+    // With the sign of the direction, by which near planes are chosen.
+    let least = select(vec3f(1e-20), vec3f(-1e-20), direction < vec3f(0.0));
+    let steep = select(direction, least, abs(direction) < vec3f(1e-20));
     let octant = select(4u, 0u, direction.x < 0.0) | select(2u, 0u, direction.y < 0.0) | select(1u, 0u, direction.z < 0.0);
     return Ray(origin, direction, 1.0 / steep, octant * 0x01010101u);
 }
@@ -115,8 +117,14 @@ fn without_nearest(todo: Todo) -> Todo {
 }
 
 const ROOT: Todo = Todo(0u, 0x80000000u);
-{% if alpha_tested or primary %}
+{% if alpha_tested or primary or glass %}
 {% include "rays/material.wgsl" %}
+{% endif %}
+{% if glass %}
+{% include "rays/glass.wgsl" %}
+
+// Surfaces that light goes through are not met by `closest`.
+var<private> ignores_glass: bool = false;
 {% endif %}
 {% if alpha_tested %}
 {% if mapped and not from_eye %}
@@ -138,8 +146,12 @@ fn is_there(slot: u32, crossing: Crossing) -> bool {
 }
 {% endif %}
 
-// Triangles block rays whichever way they face.
+// Triangles block rays whichever way they face{% if glass %}, but glass, which leaves a share of them: `passed_linear`{% endif %}.
 fn is_blocked(ray: Ray, t_max: f32) -> bool {
+{%- if glass %}
+    passed_linear = vec3f(1.0);
+    absorbed = vec3f(0.0);
+{%- endif %}
     var stack: array<Todo, STACK>;
     var height = 0u;
     var todo = ROOT;
@@ -162,12 +174,21 @@ fn is_blocked(ray: Ray, t_max: f32) -> bool {
                 blocked = is_there(slot, crossing);
             }
 {% endif %}
+{% if glass %}
+            for (var passes = blocked && (crossing.corners.x & GLASS) != 0u; passes; passes = false) {
+                pass_straight(slot, crossing, ray.direction);
+                blocked = false;
+            }
+{% endif %}
         }
         if is_done(todo) && height > 0u {
             height -= 1u;
             todo = stack[height];
         }
     }
+{%- if glass %}
+    passed_linear *= exp(-max(absorbed, vec3f(0.0)));
+{%- endif %}
     return blocked;
 }
 {% if primary %}
@@ -194,6 +215,9 @@ fn closest(ray: Ray, near: f32, far: f32) -> Hit {
             var crossing = cross_triangle(slot, ray, hit.t);
             let faces = crossing.front || (crossing.corners.x & DOUBLE_SIDED) != 0u;
             var met = crossing.met && faces && crossing.t > near;
+{%- if glass %}
+            met = met && !(ignores_glass && (crossing.corners.x & GLASS) != 0u);
+{%- endif %}
 {% if alpha_tested %}
             for (var masked = met && (crossing.corners.x & ALPHA_TESTED) != 0u; masked; masked = false) {
                 met = is_there(slot, crossing);

@@ -1,4 +1,4 @@
-// A ray off a mirror, and once it was followed the point where it ends.
+// A ray off a mirror, or of an eye that looks through glass; and once it was followed the point where it ends.
 struct Bounce {
     // Where the ray begins; once it was followed, where it ends.
     point_in_world: vec3f,
@@ -26,6 +26,8 @@ struct Bounce {
     met: u32,
     // What is nearer to a mirror than the pixel's footprint on the first is the mirror itself.
     near_m: f32,
+    // 1 for an eye's ray that has met no mirror, or else 0.
+    unmirrored: u32,
 }
 
 struct BounceList { workgroups: u32, y: u32, z: u32, count: u32 }

@@ -24,6 +24,6 @@ fn bounce_off(mirror: Mirror, arriving: Bounce) {
         mirror.point_in_world + mirror.normal * arriving.bias_m, arriving.place,
         reflect(-mirror.towards_eye, mirror.normal), hashed(arriving.seed ^ 0x68bc21ebu),
         throughput_linear, arriving.side_m, vec4u(0u), arriving.bias_m, spread, mirror.reflector.roughness, 0.0, 0u,
-        arriving.near_m,
+        arriving.near_m, 0u,
     ));
 }

@@ -24,7 +24,8 @@ pub(crate) struct GpuBounce {
     pub curvature_per_m: f32,
     pub met: u32,
     pub near_m: f32,
-    pub padding: [u32; 2],
+    pub unmirrored: u32,
+    pub padding: u32,
 }
 
 /// Rays off mirrors, or points, of one piece.

@@ -1,4 +1,4 @@
-// The surfaces where mirrored rays end.
+// The surfaces where mirrored rays end, and those that go through glass.
 {% include "packed_surface.wgsl" %}
 {% include "rays/traverse.wgsl" %}
 {% include "reflections/bounce.wgsl" %}
@@ -10,16 +10,37 @@
 const FARTHEST: f32 = 3.0e38;
 
 {% include "reflections/curvature.wgsl" %}
+{% if glass %}
+{% include "sequence.wgsl" %}
+{% include "reflections/cross_glass.wgsl" %}
+{% endif %}
+
+fn next_hit(bounce: Bounce) -> Hit {
+{%- if alpha_tested and mapped %}
+    cone_side_m = bounce.side_m;
+    cone_spread = bounce.spread;
+{%- endif %}
+    return closest(ray_from(bounce.point_in_world, bounce.direction), bounce.near_m, FARTHEST);
+}
 
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= list.count { return; }
+{% if glass %}
+    var bounce = bounces[id.x];
+    var hit = next_hit(bounce);
+    var crossed = 0u;
+    for (; hit.slot != NOTHING && crossed < MOST_INTERFACES && crosses(hit, crossed, &bounce); crossed++) {
+        hit = next_hit(bounce);
+    }
+    // What has met so many interfaces shows what lies that way far away.
+    hit.slot = select(hit.slot, NOTHING, crossed == MOST_INTERFACES);
+    bounces[id.x].direction = bounce.direction;
+    bounces[id.x].throughput_linear = bounce.throughput_linear * select(vec3f(1.0), exp(-medium_per_m * hit.t), hit.slot != NOTHING);
+{% else %}
     let bounce = bounces[id.x];
-{% if alpha_tested and mapped %}
-    cone_side_m = bounce.side_m;
-    cone_spread = bounce.spread;
+    let hit = next_hit(bounce);
 {% endif %}
-    let hit = closest(ray_from(bounce.point_in_world, bounce.direction), bounce.near_m, FARTHEST);
     for (var met = hit.slot != NOTHING; met; met = false) {
         let triangle = textureLoad(flat_triangles, texel_at(hit.slot), 0);
         let at = attributes_at(hit.crossing);

@@ -1,4 +1,4 @@
-// Adds the light from the ends of mirrored rays to their pixels, and lists the rays off mirrors among those ends.
+// Adds the light from the ends of followed rays to their pixels, and lists the rays off mirrors among those ends.
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
@@ -10,6 +10,9 @@
 {% include "sequence.wgsl" %}
 {% include "highlight.wgsl" %}
 {% include "reflections/ends.wgsl" %}
+{% if glass %}
+{% include "background.wgsl" %}
+{% endif %}
 {% if mirrors %}
 {% include "reflections/bounce_off.wgsl" %}
 {% endif %}
@@ -39,6 +42,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // A ray that leaves the scene brings what the mirror shows of the environment without rays.
     for (var missed = !met; missed; missed = false) {
         linear = environment_mirrored(bounce.direction, max(bounce.roughness, LEAST_ROUGHNESS));
+{%- if glass %}
+        // One that only went through glass brings what the eye would see there.
+        if bounce.unmirrored != 0u { linear = background_linear(bounce.direction); }
+{%- endif %}
     }
     linear *= bounce.throughput_linear;
     for (var channel = 0u; channel < 3u; channel++) { reflected[3u * bounce.place + channel] += linear[channel]; }

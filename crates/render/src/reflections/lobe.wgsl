@@ -52,7 +52,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         list_bounce(Bounce(
             spot.origin, place, ray.direction, hashed(seed ^ hashed(lobe.ray)),
             environment_reflectance(mirror) * (share * ray.weight / sum), side_m, vec4u(0u), spot.bias_m,
-            camera.footprint / length(direction), 0.0, 0.0, 0u, side_m,
+            camera.footprint / length(direction), 0.0, 0.0, 0u, side_m, 0u,
         ));
     }
 }

@@ -1,10 +1,12 @@
-//! Mirror images of the scene in views: rays off the mirrors of a picture, and into the lobes of glossy surfaces, are followed, the
-//! points where they end are lit, and their light is added to the pixels. Mirrors among those points send rays on.
+//! Mirror images of the scene in views, and what is seen through glass: rays off the mirrors of a picture, into the lobes of glossy
+//! surfaces, and of the eye through glass, are followed, the points where they end are lit, and their light is added to the pixels.
+//! Mirrors among those points send rays on.
 
 pub(crate) mod bounces;
 mod follow;
 mod land;
 pub(crate) mod lobe;
+mod look_through;
 pub(crate) mod radiance;
 mod spawn;
 
@@ -14,6 +16,7 @@ use gpu::{BufferPool, Gpu, PooledBuffer};
 pub(crate) use follow::Follow;
 pub(crate) use land::Land;
 pub(crate) use lobe::Lobe;
+pub(crate) use look_through::{LookThrough, MOST_INTERFACES};
 pub(crate) use spawn::Spawn;
 
 use self::bounces::{GpuBounce, Rays};
@@ -22,10 +25,10 @@ use crate::pieces::Piece;
 use crate::surfaces::Surfaces;
 use crate::{RenderError, illuminate};
 
-/// The pixels of a piece of a picture with mirrors: bounds the memory for rays.
+/// The pixels of a piece of a picture with mirrors or glass: bounds the memory for rays.
 pub(crate) const PIXELS_A_PIECE: u64 = 1 << 18;
 
-/// The memory for the mirror images of a batch: light for each pixel, and rays for one piece.
+/// The memory for the mirror images of a batch, and for what it shows through glass: light for each pixel, and rays for one piece.
 pub(crate) struct Reflections {
     /// Linear light, red, green and blue of each pixel.
     pub reflected: PooledBuffer,
@@ -84,7 +87,7 @@ impl Reflections {
         Ok(())
     }
 
-    /// Rays off mirrors, then of each pixel's lobe one after another: the memory is that of one ray a pixel.
+    /// Rays through glass, rays off mirrors, then of each pixel's lobe one after another: the memory is that of one ray a pixel.
     fn record_piece(
         &self,
         recording: &mut Recording<'_>,
@@ -93,6 +96,11 @@ impl Reflections {
         target: &Surfaces,
     ) -> Result<(), RenderError> {
         let mirrors = recording.batch.work.lighting.reflections();
+        if recording.batch.output.glass {
+            let first = self.rays(recording.gpu, piece.pixel_count(), 0);
+            look_through::record(recording, piece, target, &first)?;
+            self.record_rays(recording, parts, first, mirrors)?;
+        }
         if mirrors > 0 {
             let first = self.rays(recording.gpu, piece.pixel_count(), 1);
             spawn::record(recording, piece, target, &first)?;

@@ -1,6 +1,7 @@
 //! The scalar reference of this crate, for tests: every ray against every triangle, and twins of the shaders that
 //! trace rays and gather light, which do the same on the same data, one ray after another.
 
+pub mod glass;
 pub mod hashed_alpha;
 mod indirect;
 mod lamp_bits;

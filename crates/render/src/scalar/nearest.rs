@@ -26,7 +26,7 @@ pub fn nearest(scene: &Scene, ray: &Ray, near: f32) -> Option<Nearest> {
             mesh.indices[range].as_chunks::<3>().0.iter().filter_map(move |triangle| {
                 let corners = triangle.map(|i| &mesh.vertices[i as usize]);
                 let in_world = corners.map(|v| instance.world_from_mesh.transform_point3(v.position.into()));
-                let (t, barycentric, front) = intersect(ray, in_world, material.double_sided)?;
+                let (t, barycentric, front) = intersect(ray, in_world, material.has_two_sides())?;
                 let normals = glam::Mat3::from(instance.world_from_mesh.matrix3).inverse().transpose();
                 let normal = normals * blend(corners, barycentric, |v| v.normal.into());
                 let facing = if front { 1.0 } else { -1.0 };

@@ -9,7 +9,8 @@ use scene::Wrap;
 
 use super::hashed_alpha::hashed_cutoff;
 use crate::rays::flat::{
-    ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex, SPECULAR, UNLIT,
+    ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex, GLASS, SPECULAR,
+    THIN, UNLIT,
 };
 use crate::rays::ray_scene::MATERIAL_TEXELS;
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
@@ -56,6 +57,16 @@ pub struct Look {
     pub reflector: Option<Reflector>,
 }
 
+/// What a surface lets through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Glass {
+    pub transmission: f32,
+    pub ior: f32,
+    pub tint_linear: Vec3,
+    pub absorption_per_m: Vec3,
+    pub is_thin: bool,
+}
+
 /// The ray through the middle of a pixel, as on a device; its parameter is planar depth.
 #[must_use]
 pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
@@ -83,7 +94,10 @@ impl Traveller {
         Self {
             origin: ray.origin_in_world,
             direction,
-            inverse: direction.map(|d| 1.0 / if d.abs() < 1e-20 { 1e-20 } else { d }),
+            inverse: direction.map(|d| {
+                let least = if d < 0.0 { -1e-20 } else { 1e-20 };
+                1.0 / if d.abs() < 1e-20 { least } else { d }
+            }),
             octant4: octant * 0x0101_0101,
         }
     }
@@ -155,15 +169,42 @@ impl Scene {
         hit
     }
 
-    /// Whether anything lies before `t_max`, whichever way it faces.
+    /// Whether anything but glass lies before `t_max`, whichever way it faces.
     #[must_use]
     pub fn is_blocked(&self, ray: &Ray, t_max: f32) -> bool {
         let mut blocked = false;
         self.search(ray, t_max, |ray, slot, t_max| {
-            blocked = self.crossing(slot, ray, t_max).is_some_and(|crossing| self.is_there(&crossing));
+            let opaque = self.crossing(slot, ray, t_max).filter(|_| !self.has(slot, GLASS));
+            blocked = opaque.is_some_and(|crossing| self.is_there(&crossing));
             blocked.then_some(f32::NEG_INFINITY)
         });
         blocked
+    }
+
+    /// All glass before `t_max`, in no order.
+    pub(super) fn glass_before(&self, ray: &Ray, t_max: f32) -> Vec<(Hit, Glass)> {
+        let mut found = Vec::new();
+        self.search(ray, t_max, |ray, slot, t_max| {
+            let hit = self.crossing(slot, ray, t_max).filter(|hit| self.is_there(hit));
+            found.extend(hit.and_then(|hit| Some((hit, self.glass(&hit)?))));
+            None
+        });
+        found
+    }
+
+    /// What a surface whose material has no textures lets through; `None` for opaque ones.
+    pub(super) fn glass(&self, hit: &Hit) -> Option<Glass> {
+        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
+        let [coat, open, medium] =
+            [2, 6, 7].map(|part| self.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits));
+        let [r, g, b, ior] = medium;
+        (flags & GLASS != 0).then(|| Glass {
+            transmission: open[3] * (1.0 - coat[0]),
+            ior,
+            tint_linear: self.look(hit).base_linear,
+            absorption_per_m: Vec3::new(r, g, b),
+            is_thin: flags & THIN != 0,
+        })
     }
 
     /// The surface that a hit lies on.

@@ -4,6 +4,7 @@ mod animation;
 mod antialias;
 mod closed_forms;
 mod environment_map;
+mod glass;
 mod glossy;
 mod indirect;
 mod lamp_grid;

@@ -85,6 +85,11 @@ impl SourceScene {
         if let Some(animation) = &mut self.animation {
             animation.world_from_source = world_from_source;
         }
+        for volume in self.materials.iter_mut().filter_map(|material| material.volume.as_mut()) {
+            // A distance beyond the range of `f32` is as good as none.
+            volume.attenuation_distance_m =
+                (volume.attenuation_distance_m * metres_per_unit as f32).max(f32::MIN_POSITIVE);
+        }
         let scene = Scene {
             name: self.name,
             meshes: self.meshes.into_iter().map(SourceMesh::into_f32).collect(),

@@ -1,7 +1,7 @@
 //! Materials of glTF: textures with coordinates and wrap modes of their own, tangents, reflectance and blending.
 
 use glam::{Vec2, Vec3};
-use scene::{Material, Mesh, Scene, TextureUse, Wrap};
+use scene::{Limits, Material, Mesh, Scene, TextureUse, Volume, Wrap};
 
 use crate::samples::warnings::with_warnings;
 use crate::samples::{GltfCube, cube, load, refusal};
@@ -210,6 +210,113 @@ fn reflectance_follows_ior_and_specular() {
         r#""extensions":{"KHR_materials_specular":{"specularFactor":0}},"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.1}"#,
     );
     assert!(!scene.materials[0].is_specular());
+}
+
+fn glass(extensions: &str) -> Scene {
+    loaded(&format!(
+        r#""pbrMetallicRoughness":{{"metallicFactor":0}},
+        "extensions":{{"KHR_materials_transmission":{{"transmissionFactor":0.9}}{extensions}}}"#
+    ))
+}
+
+#[test]
+fn glass_has_its_transmission_index_and_volume() {
+    let thin = &glass("").materials[0];
+    assert_eq!((thin.transmission, thin.ior, thin.volume), (0.9, 1.5, None));
+    assert!(thin.is_transmissive() && thin.is_specular() && !thin.has_two_sides());
+    let ior = r#","KHR_materials_ior":{"ior":1.33}"#;
+    assert_eq!(glass(ior).materials[0].ior, 1.33);
+    let volume = |members: &str| glass(&format!(r#","KHR_materials_volume":{{{members}}}"#)).materials[0].volume;
+    assert_eq!(volume(r#""attenuationDistance":2"#), None, "a thickness of 0 is a thin surface");
+    assert_eq!(volume(r#""thicknessFactor":0.1"#), Some(Volume::CLEAR));
+    let colored = volume(r#""thicknessFactor":0.1,"attenuationDistance":0.5,"attenuationColor":[1,0.5,0.25]"#).unwrap();
+    let expected = Volume { attenuation_color_linear: Vec3::new(1.0, 0.5, 0.25), attenuation_distance_m: 0.5 };
+    assert_eq!(colored, expected);
+    let through_half_a_metre = (-colored.absorption_per_m() * 0.5).exp();
+    assert!(through_half_a_metre.distance(expected.attenuation_color_linear) < 1e-6, "{through_half_a_metre}");
+    assert!(glass(r#","KHR_materials_volume":{"thicknessFactor":0.1}"#).materials[0].has_two_sides());
+    // Opaque surfaces have neither, and a metal transmits nothing.
+    let opaque = loaded(r#""extensions":{"KHR_materials_volume":{"thicknessFactor":1},"KHR_materials_ior":{"ior":2}}"#);
+    assert_eq!((opaque.materials[0].transmission, opaque.materials[0].volume), (0.0, None));
+    assert!(!Material { metallic: 1.0, ..thin.clone() }.is_transmissive());
+    assert!(!Material { unlit: true, ..thin.clone() }.is_transmissive());
+}
+
+#[test]
+fn a_texture_of_transmission_counts_by_its_mean() {
+    let material =
+        r#""extensions":{"KHR_materials_transmission":{"transmissionFactor":0.5,"transmissionTexture":{"index":0}}}"#;
+    let (scene, warnings) = with_warnings(|| loaded(material));
+    let expected = 0.5 * 188.0 / 255.0;
+    assert!((scene.materials[0].transmission - expected).abs() < 1e-4, "{}", scene.materials[0].transmission);
+    assert!(warnings.iter().any(|w| w.contains("textures of transmission count by their mean")), "{warnings:?}");
+    assert!(scene.textures.is_empty(), "no surface shows it");
+}
+
+#[test]
+fn bad_glass_is_refused_by_material_field_and_reason() {
+    let message = |extensions: &str| {
+        let material =
+            format!(r#""extensions":{{"KHR_materials_transmission":{{"transmissionFactor":0.9}}{extensions}}}"#);
+        refusal("bad.glb", &square(&material, "").glb())
+    };
+    for (ior, reason) in [
+        ("0.99", "material 0: ior: 0.99 is not from 1 to 4"),
+        ("0", "material 0: ior: 0 is not from 1 to 4"),
+        ("4.01", "material 0: ior: 4.01 is not from 1 to 4"),
+        ("-1.5", "material 0: ior: -1.5 is not from 1 to 4"),
+        ("1e39", "material 0: ior: not finite"),
+    ] {
+        let got = message(&format!(r#","KHR_materials_ior":{{"ior":{ior}}}"#));
+        assert!(got.contains(&format!("bad.glb: {reason}")), "{ior}: {got}");
+    }
+    let volume = |members: &str| message(&format!(r#","KHR_materials_volume":{{{members}}}"#));
+    assert!(volume(r#""thicknessFactor":-1"#).contains("material 0: thickness: -1 is negative"));
+    let distance = volume(r#""thicknessFactor":1,"attenuationDistance":-0.5"#);
+    assert!(distance.contains("material 0: attenuation distance: -0.5 is negative"), "{distance}");
+    let color = volume(r#""thicknessFactor":1,"attenuationColor":[1e39,0,0]"#);
+    assert!(color.contains("material 0: attenuation colour: not finite"), "{color}");
+    let factor = r#""extensions":{"KHR_materials_transmission":{"transmissionFactor":1e39}}"#;
+    assert!(refusal("bad.glb", &square(factor, "").glb()).contains("material 0: transmission: not finite"));
+    let texture = r#""extensions":{"KHR_materials_transmission":{"transmissionTexture":{"index":9}}}"#;
+    assert!(refusal("bad.glb", &square(texture, "").glb()).contains("material 0: texture 9"));
+}
+
+#[test]
+fn glass_out_of_range_is_clamped_where_a_near_value_makes_sense() {
+    let factor = |factor: &str| {
+        let json = format!(r#""extensions":{{"KHR_materials_transmission":{{"transmissionFactor":{factor}}}}}"#);
+        loaded(&json).materials[0].transmission
+    };
+    assert_eq!((factor("1.01"), factor("-0.01")), (1.0, 0.0));
+    let clear = glass(r#","KHR_materials_volume":{"thicknessFactor":1,"attenuationDistance":0}"#);
+    assert_eq!(clear.materials[0].volume, Some(Volume::CLEAR));
+}
+
+#[test]
+fn a_scene_with_bad_glass_is_not_valid() {
+    let scene = glass(r#","KHR_materials_volume":{"thicknessFactor":0.1}"#);
+    assert_eq!(scene::unpack(&scene::pack(&scene), &Limits::default()).unwrap(), scene);
+    let refused = |change: fn(&mut Material)| {
+        let mut scene = scene.clone();
+        change(&mut scene.materials[0]);
+        let message = scene::unpack(&scene::pack(&scene), &Limits::default()).unwrap_err().to_string();
+        assert!(message.contains("package: material 0: "), "{message}");
+        message
+    };
+    assert!(refused(|m| m.transmission = -0.1).contains("transmission is not from 0 to 1"));
+    assert!(refused(|m| m.transmission = f32::NAN).contains("transmission is not from 0 to 1"));
+    assert!(refused(|m| m.ior = 0.5).contains("ior 0.5 is not from 1 to 4"));
+    assert!(refused(|m| m.ior = f32::NAN).contains("ior NaN is not from 1 to 4"));
+    assert!(
+        refused(|m| m.volume = Some(Volume { attenuation_distance_m: 0.0, ..Volume::CLEAR })).contains("distance 0")
+    );
+    let nan = |m: &mut Material| m.volume = Some(Volume { attenuation_distance_m: f32::NAN, ..Volume::CLEAR });
+    assert!(refused(nan).contains("distance NaN"));
+    let bright = |m: &mut Material| {
+        m.volume = Some(Volume { attenuation_color_linear: Vec3::splat(1.1), ..Volume::CLEAR });
+    };
+    assert!(refused(bright).contains("attenuation colour"));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::{compressed, draco, lights};
 use crate::Fault;
 
 /// Extensions that are read. Textures in AVIF and DDS have a warning of their own where a file has them in no other format.
-const READ: [&str; 18] = [
+const READ: [&str; 20] = [
     compressed::NAMES[0],
     compressed::NAMES[1],
     draco::NAME,
@@ -21,7 +21,9 @@ const READ: [&str; 18] = [
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
+    "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
     "KHR_texture_basisu",

@@ -12,7 +12,7 @@ use super::texture_coordinates::Coordinates;
 use super::textures::{
     BASE_COLOR, EMISSIVE, METALLIC_ROUGHNESS, Means, NORMAL, OCCLUSION, Pictures, Uses, number_shown,
 };
-use crate::{DIELECTRIC_REFLECTANCE, Fault, Material};
+use crate::{DEFAULT_IOR, DIELECTRIC_REFLECTANCE, Fault, MAX_IOR, Material, Volume, reflectance_of_ior};
 
 /// Fills the scene's materials, one more than the file's (its default), and its textures. Returns the coordinates that the
 /// vertices of each material have.
@@ -58,6 +58,13 @@ struct Surface {
     mean_factors: [f32; 2],
 }
 
+/// What a surface lets through.
+struct Transmission {
+    share: f32,
+    ior: f32,
+    volume: Option<Volume>,
+}
+
 impl MaterialReader<'_> {
     fn material(self) -> Result<Material, Fault> {
         let Self { material, uses, element, .. } = &self;
@@ -72,6 +79,7 @@ impl MaterialReader<'_> {
         let mean_reflectance = reflectance.element_sum() / 3.0;
         let (phong_specular, phong_exponent) =
             Material::phong_from_metallic_roughness(metallic, roughness, mean_reflectance);
+        let Transmission { share: transmission, ior, volume } = self.transmission()?;
         let scale = material.normal_texture.as_ref().map_or(1.0, |t| t.scale);
         let strength = material.occlusion_texture.as_ref().map_or(1.0, |t| t.strength.0);
         for (map, name) in [(NORMAL, "normal map"), (OCCLUSION, "occlusion texture")] {
@@ -103,6 +111,9 @@ impl MaterialReader<'_> {
             alpha_hashed: alpha_mode == AlphaMode::Blend,
             double_sided: material.double_sided,
             unlit: material.extensions.as_ref().is_some_and(|e| e.unlit.is_some()),
+            transmission,
+            ior,
+            volume,
             name: material.name.clone().unwrap_or(self.element),
         })
     }
@@ -144,7 +155,7 @@ impl MaterialReader<'_> {
             None => DIELECTRIC_REFLECTANCE,
             // The extension's text: 0 stands for an infinite index.
             Some(0.0) => 1.0,
-            Some(ior) => ((ior.max(1.0) - 1.0) / (ior.max(1.0) + 1.0)).powi(2),
+            Some(ior) => reflectance_of_ior(ior.max(1.0)),
         };
         let Some(specular) = extensions.and_then(|e| e.specular.as_ref()) else { return Ok(Vec3::splat(from_ior)) };
         let factor = self.clamped("specular", specular.specular_factor.0, 1.0)?;
@@ -152,6 +163,51 @@ impl MaterialReader<'_> {
         let factor = factor * uses.specular.map_or(1.0, |place| means.linear(place).w);
         let color = color * uses.specular_color.map_or(Vec3::ONE, |place| means.linear(place).truncate());
         Ok((color * from_ior).min(Vec3::ONE) * factor)
+    }
+
+    /// `KHR_materials_transmission`, with the refractive index and the volume that only transmissive surfaces have. The texture
+    /// counts by its mean.
+    fn transmission(&self) -> Result<Transmission, Fault> {
+        let opaque = Transmission { share: 0.0, ior: DEFAULT_IOR, volume: None };
+        let Some(extensions) = &self.material.extensions else { return Ok(opaque) };
+        let Some(json) = &extensions.transmission else { return Ok(opaque) };
+        let factor = self.clamped("transmission", json.transmission_factor.0, 1.0)?;
+        let share = factor * self.uses.transmission.map_or(1.0, |place| self.means.linear(place).x);
+        if share == 0.0 {
+            return Ok(opaque);
+        }
+        let ior = self.finite("ior", extensions.ior.as_ref().map_or(DEFAULT_IOR, |ior| ior.ior.0))?;
+        if !(1.0..=MAX_IOR).contains(&ior) {
+            let reason = format!("{ior} is not from 1 to {MAX_IOR}, as of a surface that light goes through");
+            return Err(Fault::malformed(format_args!("{}: ior", self.element), reason));
+        }
+        Ok(Transmission { share, ior, volume: self.volume()? })
+    }
+
+    /// `KHR_materials_volume`; `None` for a surface without thickness. Rays measure the thickness themselves.
+    fn volume(&self) -> Result<Option<Volume>, Fault> {
+        let json = self.material.extensions.as_ref().and_then(|e| e.volume.as_ref());
+        let Some(json) = json else { return Ok(None) };
+        if self.not_negative("thickness", json.thickness_factor.0)? == 0.0 {
+            return Ok(None);
+        }
+        let color = self.all_clamped("attenuation colour", json.attenuation_color.0, 1.0)?;
+        let distance = self.not_negative("attenuation distance", json.attenuation_distance.0)?;
+        if distance == 0.0 {
+            tracing::warn!("{}: an attenuation distance of 0 counts as none", self.element);
+        }
+        Ok(Some(Volume {
+            attenuation_color_linear: color.into(),
+            attenuation_distance_m: if distance == 0.0 { f32::INFINITY } else { distance },
+        }))
+    }
+
+    fn not_negative(&self, name: &str, value: f32) -> Result<f32, Fault> {
+        if value >= 0.0 {
+            Ok(value)
+        } else {
+            Err(Fault::malformed(format_args!("{}: {name}", self.element), format!("{value} is negative or no number")))
+        }
     }
 
     fn emissive(&self) -> Result<Vec3, Fault> {

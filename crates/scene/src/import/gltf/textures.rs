@@ -100,6 +100,7 @@ pub(super) struct Uses {
     pub specular: Option<usize>,
     pub specular_color: Option<usize>,
     pub specular_glossiness_texture: Option<usize>,
+    pub transmission: Option<usize>,
 }
 
 impl Uses {
@@ -118,7 +119,13 @@ impl Uses {
             let texture = second_uv.map(|second_uv| TextureUse { texture: place as u32, second_uv, wrap });
             *used = Some(Used { place, texture });
         }
-        let specular = material.extensions.as_ref().and_then(|e| e.specular.as_ref());
+        let extensions = material.extensions.as_ref();
+        let specular = extensions.and_then(|e| e.specular.as_ref());
+        let transmission = extensions.and_then(|e| e.transmission.as_ref());
+        let transmission = transmission.and_then(|t| t.transmission_texture.as_ref());
+        if transmission.is_some() {
+            pictures.document.warnings.count("textures of transmission count by their mean", element);
+        }
         let glossiness = specular_glossiness.as_ref().and_then(|s| s.specular_glossiness_texture.as_ref());
         let mut place = |info: Option<&Info>, content| match info {
             Some(info) => pictures.place(info.index, content, element),
@@ -130,6 +137,7 @@ impl Uses {
             specular: place(specular.and_then(|s| s.specular_texture.as_ref()), Data)?,
             specular_color: place(specular.and_then(|s| s.specular_color_texture.as_ref()), Colors)?,
             specular_glossiness_texture: place(glossiness, Colors)?,
+            transmission: place(transmission, Data)?,
             specular_glossiness,
         })
     }
