@@ -182,7 +182,7 @@ fn what_does_not_fit_is_refused_by_name() {
     let bounds = scene().bounds();
     let base = CommonCell { kind: CommonKind::Base, bounds, sampling: "layered_cube:8".to_owned() };
     let error = engine().with_common(light, vec![(base, colored)]).err().map(|error| error.to_string());
-    assert!(error.as_deref().is_some_and(|error| error.contains("neither mirror cells nor a base")), "{error:?}");
+    assert!(error.as_deref().is_some_and(|error| error.contains("no mirror cells, base or blocks")), "{error:?}");
     let elsewhere = SampleSet { scene_hash: "elsewhere".to_owned(), ..decoded_set() };
     let error = engine().upload(&elsewhere, TURN).err();
     assert_eq!(error, Some(EngineError::UnknownScene { hash: "elsewhere".to_owned() }));
