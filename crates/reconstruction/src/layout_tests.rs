@@ -78,6 +78,7 @@ fn shader(module: &Module, name: &str) -> Layout {
 fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
         "antialias.wgsl",
+        "blocks.wgsl",
         "bounce/curved_search.wgsl",
         "bounce/land.wgsl",
         "bounce/march.wgsl",
@@ -157,8 +158,14 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let count = offset_of!(GpuPixelList, count);
     let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
     let list = Layout::new(fields, size_of::<GpuPixelList>());
-    let searches =
-        ["bounce/curved_search.wgsl", "joint_carve.wgsl", "layered.wgsl", "light_field_search.wgsl", "resolve.wgsl"];
+    let searches = [
+        "blocks.wgsl",
+        "bounce/curved_search.wgsl",
+        "joint_carve.wgsl",
+        "layered.wgsl",
+        "light_field_search.wgsl",
+        "resolve.wgsl",
+    ];
     let marches = ["bounce/march.wgsl", "joint_carve/march.wgsl", "joint_carve/smooth.wgsl"];
     let written = [&searches[..], &marches].concat();
     assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from_iter(written));
@@ -170,6 +177,7 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
         "fill.wgsl",
         "joint_carve.wgsl",
         "layered.wgsl",
+        "light_field_search.wgsl",
         "joint_carve/march.wgsl",
         "specular.wgsl",
     ];
