@@ -49,18 +49,23 @@ pub(crate) fn record(
     drawing: &QuadDrawing,
     method: ReconstructionMethod,
 ) -> Result<Option<PixelList>, ReconstructionError> {
-    let Some(blocks) = recording.blocks.take() else { return Ok(None) };
+    let Some(mut blocks) = recording.blocks.take() else { return Ok(None) };
     let own = recording.set;
-    for (number, block) in blocks.front_to_back.iter().enumerate() {
-        recording.enter(block);
+    let own_tile_start_m = recording.batch.tile_start_m.take();
+    for number in 0..blocks.front_to_back.len() {
+        recording.enter(blocks.front_to_back[number].set);
         let rays = if number == 0 { ListedRays::OfFirstBlock } else { ListedRays::OfNextBlock };
         let crossing = list(recording, &blocks, rays)?;
-        tile_start::record(recording)?;
+        recording.batch.tile_start_m = blocks.front_to_back[number].tile_start_m.take();
+        if recording.batch.tile_start_m.is_none() {
+            tile_start::record(recording)?;
+        }
         method.record(drawing, None, recording, Some(&crossing), None)?;
         specular::record(recording, Some(&crossing), None, None)?;
+        blocks.front_to_back[number].tile_start_m = recording.batch.tile_start_m.take();
     }
     recording.enter(own);
-    tile_start::record(recording)?;
+    recording.batch.tile_start_m = own_tile_start_m;
     let unknown = list(recording, &blocks, ListedRays::LeftUnknown)?;
     recording.blocks = Some(blocks);
     Ok(Some(unknown))

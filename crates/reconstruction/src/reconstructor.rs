@@ -16,7 +16,9 @@ use crate::lobes::GlossyList;
 use crate::methods::layered::{self, Ends, Walked};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
-use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
+use crate::recording::{
+    MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, VisitedBlocks, batches,
+};
 use crate::reflectors::LobeLight;
 use crate::sample_set::{self, SampleSet};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
@@ -206,9 +208,9 @@ impl Reconstructor {
         let bounces = [mirrors?, lobes?];
         let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
         self.record_positions(prepared, &mut recording)?;
-        let of_blocks = recording.blocks.take().map(|blocks| [blocks.listed, blocks.unknown]);
         let of_bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory);
-        recording.batch.lent = of_bounces.chain(of_blocks.into_iter().flatten()).collect();
+        let of_blocks = recording.blocks.take().into_iter().flat_map(VisitedBlocks::into_memory);
+        recording.batch.lent = of_bounces.chain(of_blocks).collect();
         Ok(recording)
     }
 
@@ -219,8 +221,8 @@ impl Reconstructor {
         recording: &mut Recording<'_>,
     ) -> Result<(), ReconstructionError> {
         let ReconstructRequest { method, planes, .. } = prepared.request;
-        // What a tile's start proves holds for every position within its pixels. Each block has starts of its own.
-        if method.follows_rays() && recording.blocks.is_none() {
+        // What a tile's start proves holds for every position within its pixels.
+        if method.follows_rays() {
             tile_start::record(recording)?;
         }
         if planes.antialias == Antialias::NONE {

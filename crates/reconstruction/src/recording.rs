@@ -43,9 +43,15 @@ pub(crate) struct Recording<'r> {
 
 /// The blocks of a batch whose views all see them in one order, and memory for lists of rays.
 pub(crate) struct VisitedBlocks<'r> {
-    pub front_to_back: Vec<&'r SampleSet>,
+    pub front_to_back: Vec<VisitedBlock<'r>>,
     pub listed: PooledBuffer,
     pub unknown: PooledBuffer,
+}
+
+pub(crate) struct VisitedBlock<'r> {
+    pub set: &'r SampleSet,
+    /// As in [`Batch`]; `None` until a first position has come to the block.
+    pub tile_start_m: Option<PooledBuffer>,
 }
 
 /// Some rows of a view.
@@ -95,6 +101,14 @@ pub(crate) struct Batch {
     pub targets: Option<QuadTargets>,
     /// The memory of mirrored rays and of blocks, lent until the device is done with the batch.
     pub lent: Vec<PooledBuffer>,
+}
+
+impl VisitedBlocks<'_> {
+    /// Lent until the device is done with the batch.
+    pub fn into_memory(self) -> impl Iterator<Item = PooledBuffer> {
+        let starts = self.front_to_back.into_iter().filter_map(|block| block.tile_start_m);
+        starts.chain([self.listed, self.unknown])
+    }
 }
 
 impl<'r> Recording<'r> {
@@ -151,11 +165,15 @@ impl<'r> Recording<'r> {
 
     /// Lends what visits to blocks need; nothing without blocks.
     pub fn lend_blocks(&mut self, blocks: &[&'r SampleSet]) {
+        if blocks.is_empty() {
+            return;
+        }
         let numbers = front_to_back(blocks, &self.batch.centers[0]);
         let [listed, unknown] = ["pixels whose rays cross a block", "pixels unknown in blocks"]
             .map(|label| self.device.buffers.lend_storage(label, self.batch.plane_bytes));
-        let front_to_back = numbers.into_iter().map(|number| blocks[number]).collect();
-        self.blocks = (!blocks.is_empty()).then_some(VisitedBlocks { front_to_back, listed, unknown });
+        let front_to_back = numbers.into_iter().map(|number| VisitedBlock { set: blocks[number], tile_start_m: None });
+        let front_to_back = front_to_back.collect();
+        self.blocks = Some(VisitedBlocks { front_to_back, listed, unknown });
     }
 
     /// Records what follows for another set's images.

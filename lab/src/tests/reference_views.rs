@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::reference_views::{self, ReferenceViews};
+use crate::reference_views::{self, ReferenceViews, encoded_and_decoded};
 use app_core::addresses::listen;
 use app_core::cluster::Cluster;
 use app_core::delivery::{open, receive, request};
 use app_core::process::runtime;
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
-use cluster::{PolicyChoice, SessionRequest};
+use cluster::{PolicyChoice, SessionRequest, Workload};
 use coordinator::CoordinatorConfig;
-use depth_image::{Environment, PinholeCamera, SampleCamera, SampleImages, ViewCell, ViewPlanes};
+use depth_image::{Environment, PinholeCamera, SampleCamera, SampleImage, SampleImages, View, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
-use node::{DirectWork, Engine as _, EngineError, SampleWork, Turn, ViewWork, WorkClass};
+use node::{DirectWork, Engine as _, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
 use reconstruction::ReconstructionMethod;
 
 const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
@@ -92,7 +92,7 @@ fn unknown_names_are_refused_with_their_field() {
     assert!(is_invalid(&sample(&hash, "random", "unlit"), "sampling_method"));
     assert!(is_invalid(&sample(&hash, "conventional", "candles"), "lighting"));
     assert!(is_invalid(&sample(&hash, "layered_cube:64", "unlit"), "sample_cameras"));
-    let set = node::SampleSet {
+    let set = SampleSet {
         scene_hash: hash.clone(),
         images: SampleImages::Depth(reference_views::sample(&engine, &setup, &args).unwrap()),
         volume: setup.offer.volume,
@@ -113,7 +113,7 @@ fn unknown_names_are_refused_with_their_field() {
     assert!(is_invalid(&refused(&work("guess", 0.01)), "reconstruction_method"));
     assert!(is_invalid(&refused(&work("joint_carve", -1.0)), "camera"));
     assert!(is_invalid(
-        &engine.upload(&node::SampleSet { images: SampleImages::Depth(Vec::new()), ..set }, TURN).err().unwrap(),
+        &engine.upload(&SampleSet { images: SampleImages::Depth(Vec::new()), ..set }, TURN).err().unwrap(),
         "sample_images"
     ));
     assert!(is_invalid(&engine.load_scene("x", b"no package").unwrap_err(), "package"));
@@ -143,15 +143,30 @@ fn a_package_loads_as_the_scene_does() {
     }
 }
 
+/// Views of a workload by one engine, which finds surfaces in the way that was measured to be faster for the workload.
+fn views_of(
+    engine: &GpuEngine,
+    workload: &Workload,
+    method: ReconstructionMethod,
+    cameras: &[PinholeCamera],
+) -> Vec<View> {
+    let images = SampleImage::depth_images(engine.sample(&SampleWork::of(workload), TURN).unwrap()).unwrap();
+    let decoded = images.iter().map(|image| encoded_and_decoded(image).map(SampleImage::Depth));
+    let decoded: Vec<SampleImage> = decoded.collect::<Result<_, _>>().unwrap();
+    let set = engine.upload(&SampleSet::of(workload, decoded, false).unwrap(), TURN).unwrap();
+    let work = ViewWork { cameras: cameras.to_vec(), method: method.to_string(), planes: ViewPlanes::ALL };
+    engine.reconstruct(set.as_ref(), &work, TURN).unwrap()
+}
+
 #[test]
 fn a_cluster_gives_what_one_engine_gives() {
     let (engine, args, setup, reference) = reference("uv-sphere", 16);
-    let alone = reference.reconstruct(args.method(), ViewPlanes::ALL).unwrap();
-    let mut delivered = runtime().unwrap().block_on(async {
+    let (mut delivered, workload) = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
         let config = CoordinatorConfig::default();
-        let cluster =
-            Cluster::start(|it| it, listener, config, setup.offer.clone().into(), engine.opener(), 3).await.unwrap();
+        let cluster = Cluster::start(|it| it, listener, config, setup.offer.clone().into(), engine.clone().opener(), 3)
+            .await
+            .unwrap();
         let client = cluster.client().await.unwrap();
         let offer = client.status().await.unwrap().offers.remove(0);
         assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));
@@ -168,8 +183,9 @@ fn a_cluster_gives_what_one_engine_gives() {
         receive(&session, &reference.cameras, received).await.unwrap();
         drop((session, client));
         cluster.drain().await.unwrap();
-        frames
+        (frames, plan.assignment.workload.clone())
     });
+    let alone = views_of(&engine, &workload, args.method(), &reference.cameras);
     delivered.sort_by_key(|frame| frame.request.frame);
     let views: Vec<_> = delivered.into_iter().map(|frame| frame.view).collect();
     assert_eq!(views.len(), 16);

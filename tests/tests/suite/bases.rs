@@ -13,7 +13,7 @@ use depth_image::{Aabb, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
-const SOON: Duration = Duration::from_secs(20);
+pub const SOON: Duration = Duration::from_secs(20);
 
 /// The scene with a base.
 fn with_base() -> SceneOffer {
@@ -22,22 +22,22 @@ fn with_base() -> SceneOffer {
     SceneOffer { base: Some((cell, cube_grid())), ..offer }
 }
 
-fn around(azimuth_rad: f32) -> PinholeCamera {
+pub fn around(azimuth_rad: f32) -> PinholeCamera {
     camera_around(azimuth_rad, 3.0, UVec2::new(36, 27))
 }
 
-fn asked(viewpoints: Vec<PinholeCamera>) -> SessionRequest {
+pub fn asked(viewpoints: Vec<PinholeCamera>) -> SessionRequest {
     let asked = request(PolicyChoice::Pipeline, STILL);
     SessionRequest { forced_sampler_count: Some(1), viewpoints, ..asked }
 }
 
-async fn frames(session: &Session, azimuths: impl IntoIterator<Item = f32>) -> usize {
+pub async fn frames(session: &Session, azimuths: impl IntoIterator<Item = f32>) -> usize {
     let request = |(frame, azimuth)| ViewRequest { frame, set_index: 0, camera: around(azimuth) };
     let requests: Vec<ViewRequest> = (0..).zip(azimuths).map(request).collect();
     session.render_views(requests).unwrap().all().await.unwrap().len()
 }
 
-fn kinds(session: &Session) -> Vec<CommonKind> {
+pub fn kinds(session: &Session) -> Vec<CommonKind> {
     session.plan().assignment.workload.common_cells.iter().map(|cell| cell.kind).collect()
 }
 

@@ -1,18 +1,15 @@
 //! Blocks of a scene in a cluster: sets that every view is made from, and that depend on no viewer.
 
 use std::f32::consts::PI;
-use std::time::Duration;
 
-use client::{Session, ViewRequest};
-use cluster::{BudgetRequest, CommonCell, CommonKind, DIRECT, PolicyChoice, SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, camera_around, offer, request};
+use cluster::{BudgetRequest, CommonCell, CommonKind, DIRECT, PolicyChoice, SessionRequest};
+use cluster_tests::cluster::{Cluster, offer};
 use cluster_tests::watcher::eventually;
 use coordinator::{OfferedCell, SceneOffer};
 use depth_image::{Aabb, PinholeCamera};
 use glam::{UVec2, Vec3};
 
-const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
-const SOON: Duration = Duration::from_secs(20);
+use crate::bases::{self, SOON, around, frames, kinds};
 
 /// The scene with two blocks side by side.
 fn with_blocks() -> SceneOffer {
@@ -29,23 +26,8 @@ fn with_blocks() -> SceneOffer {
     SceneOffer { blocks: blocks.to_vec(), ..offer }
 }
 
-fn around(azimuth_rad: f32) -> PinholeCamera {
-    camera_around(azimuth_rad, 3.0, UVec2::new(36, 27))
-}
-
 fn asked(viewpoints: Vec<PinholeCamera>) -> SessionRequest {
-    let asked = request(PolicyChoice::Pipeline, STILL);
-    SessionRequest { forced_sampler_count: Some(1), viewpoints, follows_mirrors: true, ..asked }
-}
-
-async fn frames(session: &Session, azimuths: impl IntoIterator<Item = f32>) -> usize {
-    let request = |(frame, azimuth)| ViewRequest { frame, set_index: 0, camera: around(azimuth) };
-    let requests: Vec<ViewRequest> = (0..).zip(azimuths).map(request).collect();
-    session.render_views(requests).unwrap().all().await.unwrap().len()
-}
-
-fn kinds(session: &Session) -> Vec<CommonKind> {
-    session.plan().assignment.workload.common_cells.iter().map(|cell| cell.kind).collect()
+    SessionRequest { follows_mirrors: true, ..bases::asked(viewpoints) }
 }
 
 #[tokio::test(flavor = "multi_thread")]
