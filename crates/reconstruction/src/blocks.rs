@@ -42,6 +42,22 @@ impl ShaderVariant for ListRays {
     }
 }
 
+/// Records the tiles' starts in the blocks of a recording, which hold for every position within the pixels.
+pub(crate) fn record_tile_starts(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+    let Some(mut blocks) = recording.blocks.take() else { return Ok(()) };
+    let own = recording.set;
+    let own_tile_start_m = recording.batch.tile_start_m.take();
+    for block in &mut blocks.front_to_back {
+        recording.enter(block.set);
+        tile_start::record(recording)?;
+        block.tile_start_m = recording.batch.tile_start_m.take();
+    }
+    recording.enter(own);
+    recording.batch.tile_start_m = own_tile_start_m;
+    recording.blocks = Some(blocks);
+    Ok(())
+}
+
 /// Records the search in the blocks of a recording, with their highlights. Gives the pixels that some block has left unknown, or `None`
 /// without blocks.
 pub(crate) fn record(
@@ -57,9 +73,6 @@ pub(crate) fn record(
         let rays = if number == 0 { ListedRays::OfFirstBlock } else { ListedRays::OfNextBlock };
         let crossing = list(recording, &blocks, rays)?;
         recording.batch.tile_start_m = blocks.front_to_back[number].tile_start_m.take();
-        if recording.batch.tile_start_m.is_none() {
-            tile_start::record(recording)?;
-        }
         method.record(drawing, None, recording, Some(&crossing), None)?;
         specular::record(recording, Some(&crossing), None, None)?;
         blocks.front_to_back[number].tile_start_m = recording.batch.tile_start_m.take();

@@ -224,6 +224,7 @@ impl Reconstructor {
         // What a tile's start proves holds for every position within its pixels.
         if method.follows_rays() {
             tile_start::record(recording)?;
+            blocks::record_tile_starts(recording)?;
         }
         if planes.antialias == Antialias::NONE {
             self.record_position(prepared, recording, None)?;

@@ -50,7 +50,7 @@ pub(crate) struct VisitedBlocks<'r> {
 
 pub(crate) struct VisitedBlock<'r> {
     pub set: &'r SampleSet,
-    /// As in [`Batch`]; `None` until a first position has come to the block.
+    /// As in [`Batch`].
     pub tile_start_m: Option<PooledBuffer>,
 }
 
