@@ -34,9 +34,9 @@ const CORNER_SHARE: f32 = 0.98;
 const FRAME_ASPECT: f32 = 4.0 / 3.0;
 /// The direction from a model to the eye: a three-quarter view, 25° from the front and 30° above.
 const THREE_QUARTER: Vec3 = Vec3::new(0.3660, 0.5, 0.7849);
-/// Cameras of a block stand so far over its highest point, in halves of its width: as the paper's over their tile.
+/// The height of a block's cameras over its highest point, in halves of its width: as the paper's over their tile.
 const BLOCK_CLEARANCE: f32 = 3.0;
-/// Flat blocks are seen within less.
+/// The widest field of view of a block's cameras; those of flat blocks are narrower.
 const MAX_BLOCK_FOV_RAD: f32 = 2.0;
 /// The least distance from an eye to a model's nearest point, in radii of the model.
 const LEAST_GAP_RADII: f32 = 0.5;
