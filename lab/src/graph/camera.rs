@@ -17,6 +17,8 @@ use super::region;
 pub const WALL_SLACK_M: f64 = 0.01;
 /// The greatest distance of a face's corner from its plane, and of a face from its parent's region.
 const FACE_SLACK_M: f64 = 1e-5;
+/// The far end of a pinhole.
+const PINHOLE_FAR_M: f64 = 1e3;
 
 /// The first frustum, as its maker describes it.
 #[derive(Debug, Clone)]
@@ -84,6 +86,15 @@ pub struct Frustum {
 pub struct GraphCamera {
     pub frusta: Vec<Frustum>,
     parts_px: Vec<UVec2>,
+}
+
+/// A pinhole: a root without frusta behind it.
+///
+/// # Errors
+/// The camera cannot be used.
+pub fn pinhole(camera: &PinholeCamera) -> anyhow::Result<GraphCamera> {
+    let root = RootPlan { camera: *camera, walls: Vec::new(), far_m: PINHOLE_FAR_M };
+    Ok(GraphCamera::new(&GraphPlan { root, frusta: Vec::new() }, &Layout::Nested)?)
 }
 
 /// A place in an image: the frustum, columns and rows of its part, and w.

@@ -83,6 +83,16 @@ impl<'c> GraphImage<'c> {
         self.camera.unproject(GraphPlace { frustum: sample.frustum(), pixel: center(texel), w_m })
     }
 
+    /// The point that the texel around a place of a part shows; `None` outside the image and where it shows nothing.
+    pub fn point_at(&self, part: usize, pixel: DVec2) -> Option<DVec3> {
+        let part = &self.parts[part];
+        let texel = pixel.floor();
+        let is_inside = texel.cmpge(DVec2::ZERO).all() && texel.cmplt(part.size_px.as_dvec2()).all();
+        let texel = texel.as_uvec2();
+        let sample = is_inside.then(|| part.at(texel)).flatten()?;
+        Some(self.point(&sample, texel))
+    }
+
     fn connected_cells(&self, part: usize) -> Vec<bool> {
         let size_px = self.parts[part].size_px;
         let cells = (0..size_px.element_product()).into_par_iter();

@@ -15,8 +15,8 @@ pub mod test_support;
 mod through;
 
 pub use behind::behind;
-pub use camera::{Frustum, GraphCamera, GraphPlan, Layout};
+pub use camera::{Frustum, GraphCamera, GraphPlace, GraphPlan, Layout, pinhole};
 pub use image::{CORNERS, GraphImage, Met};
 pub use plane::Plane;
-pub use search::GraphSearch;
+pub use search::{GraphHit, GraphSearch};
 pub use through::{Corridor, Portal, through, upright};

@@ -35,6 +35,7 @@ pub struct GraphEnd {
 pub struct GraphHit {
     pub way_m: f64,
     pub color_linear: Vec3,
+    pub normal_in_world: DVec3,
 }
 
 /// The part of a ray in one frustum: column, row and 1/w are linear in s from 0 to 1.
@@ -77,7 +78,7 @@ impl GraphImage<'_> {
             let walk = seen.walk(search, before);
             end.steps += walk.steps;
             if let Some(s) = walk.met_at {
-                end.met = Some(GraphHit { way_m: seen.way_m(s), color_linear: seen.color_linear(s) });
+                end.met = Some(seen.hit(s));
                 break;
             }
             before = Some(walk.last);
@@ -177,16 +178,21 @@ impl Seen<'_> {
         self.span_m[0] + (self.span_m[1] - self.span_m[0]) * share
     }
 
-    fn color_linear(&self, s: f64) -> Vec3 {
+    /// Interpolates between the samples of a connected cell, and takes the nearest one elsewhere.
+    fn hit(&self, s: f64) -> GraphHit {
         let place = self.place(s);
         let cell = cell_of(place, self.part);
         let within = place - cell.as_dvec2();
-        let corners = self.part.corners(cell);
-        if !self.part.is_connected(cell) {
-            return corners[nearest(within)].map_or(Vec3::ZERO, |sample| sample.color_linear());
+        let shares = if self.part.is_connected(cell) { shares(within) } else { nearest_alone(within) };
+        let mut color_linear = Vec3::ZERO;
+        let mut normal = DVec3::ZERO;
+        for (sample, share) in self.part.corners(cell).into_iter().zip(shares) {
+            if let Some(sample) = sample.filter(|_| share > 0.0) {
+                color_linear += sample.color_linear() * share as f32;
+                normal += sample.normal_in_world() * share;
+            }
         }
-        let shared = corners.into_iter().flatten().zip(shares(within));
-        shared.map(|(sample, share)| sample.color_linear() * share as f32).sum()
+        GraphHit { way_m: self.way_m(s), color_linear, normal_in_world: normal.normalize_or_zero() }
     }
 
     /// `before` is the last look in the frustum that the ray comes from.
@@ -244,6 +250,13 @@ fn cell_of(place: DVec2, part: &Part) -> UVec2 {
 
 fn nearest(within: DVec2) -> usize {
     usize::from(within.x >= 0.5) + 2 * usize::from(within.y >= 0.5)
+}
+
+/// All of the nearest corner.
+fn nearest_alone(within: DVec2) -> [f64; 4] {
+    let mut shares = [0.0; 4];
+    shares[nearest(within)] = 1.0;
+    shares
 }
 
 /// The share of each corner, in the order of [`CORNERS`].

@@ -6,6 +6,7 @@ use render::Lighting;
 use report::{Bar, Check};
 use sampling::Impostors;
 
+use super::horizons;
 use super::maze;
 use super::measure::{Figures, Hall, around};
 use super::single_rays::{self, Teapot};
@@ -62,6 +63,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     report.checks.extend(single_rays::checks(&rows)?);
     walk::measure(&teapot, &mut report)?;
     maze::measure(&stand, args.quick, &mut report)?;
+    horizons::measure(&stand, args.quick, &mut report)?;
     args.finish("out/study/impostors", &report)
 }
 

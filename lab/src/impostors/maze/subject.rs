@@ -9,6 +9,7 @@ use scene::Scene;
 
 use crate::failures::stand::Stand;
 use crate::graph::Met;
+use crate::impostors::surfaces::Surfaces;
 
 /// Nothing is met nearer to the teapot.
 pub const NEAR_M: f32 = 0.002;
@@ -24,7 +25,7 @@ pub struct Subject<'s> {
     pub maze: Maze,
     pub scene: Scene,
     pub on_device: GpuScene,
-    surfaces: scalar::rays::Scene,
+    surfaces: Surfaces,
     teapot: scalar::rays::Scene,
 }
 
@@ -49,7 +50,7 @@ impl<'s> Subject<'s> {
     pub fn new(stand: &'s Stand, maze: Maze) -> anyhow::Result<Self> {
         let scene = maze.scene(None);
         let on_device = stand.upload(&scene)?;
-        let surfaces = scalar::rays::Scene::of(&on_device, 0.0)?;
+        let surfaces = Surfaces::new(stand, &scene)?;
         let teapot = scalar::rays::Scene::of(&stand.upload(&maze_teapot())?, 0.0)?;
         Ok(Self { stand, maze, scene, on_device, surfaces, teapot })
     }
@@ -59,10 +60,8 @@ impl<'s> Subject<'s> {
     }
 
     /// The maze's surface on a ray, in its own colour.
-    pub fn meet(&self, ray: &Ray, [near, far]: [f32; 2]) -> Option<Met> {
-        let hit = self.surfaces.closest_between(ray, near, far)?;
-        let normal_in_world = self.surfaces.triangle_normal_in_world(&hit);
-        Some(Met { t: hit.t, normal_in_world, color_linear: self.surfaces.look(&hit).base_linear })
+    pub fn meet(&self, ray: &Ray, span: [f32; 2]) -> Option<Met> {
+        self.surfaces.meet(ray, span)
     }
 
     /// The colour that a ray meets.
