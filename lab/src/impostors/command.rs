@@ -6,6 +6,7 @@ use render::Lighting;
 use report::{Bar, Check};
 use sampling::Impostors;
 
+use super::glass;
 use super::horizons;
 use super::maze;
 use super::measure::{Figures, Hall, around};
@@ -64,6 +65,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     walk::measure(&teapot, &mut report)?;
     maze::measure(&stand, args.quick, &mut report)?;
     horizons::measure(&stand, args.quick, &mut report)?;
+    glass::measure(&stand, args.quick, &mut report)?;
     args.finish("out/study/impostors", &report)
 }
 
