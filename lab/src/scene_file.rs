@@ -13,7 +13,8 @@ use scene::{Limits, MissingTextures, SceneSpec};
 #[command(after_help = "Example: myriorama-lab scene bird-nest --out bird-nest.glb")]
 pub struct SceneFileArgs {
     /// A fixture (quad, unit-cube, uv-sphere, checker-sphere, poles, blocks, bird-nest, tree, teapot-mirror, mirror-pair,
-    /// mirror-box, teapot-floor, teapot-spheres, glass, hidden-block, maze:HEIGHT[:roofed] of heights 0.5, 1, 1.5, 2 and 3), or a
+    /// mirror-box, teapot-floor, teapot-spheres, glass, hidden-block, maze:HEIGHT[:roofed] of heights 0.5, 1, 1.5, 2 and 3, car-park:N of
+    /// 10, 40, 160 and 1200 cars, barrels:60), or a
     /// scene that the program takes
     #[arg(value_name = "NAME")]
     scene: SceneSpec,

@@ -10,6 +10,7 @@ use super::glass;
 use super::horizons;
 use super::maze;
 use super::measure::{Figures, Hall, around};
+use super::reliefs;
 use super::single_rays::{self, Teapot};
 use super::walk;
 use crate::failures::stand::Stand;
@@ -66,6 +67,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     maze::measure(&stand, args.quick, &mut report)?;
     horizons::measure(&stand, args.quick, &mut report)?;
     glass::measure(&stand, args.quick, &mut report)?;
+    reliefs::measure(&stand, args.quick, &mut report)?;
     args.finish("out/study/impostors", &report)
 }
 

@@ -7,6 +7,7 @@ mod maze;
 mod measure;
 mod objects;
 mod rays;
+mod reliefs;
 mod single_rays;
 mod surfaces;
 mod walk;
