@@ -52,7 +52,7 @@ struct Stage {
 }
 
 /// What a pixel shows.
-enum Shown {
+enum PixelContent {
     Glass(Entry),
     Other(Option<Vec3>),
 }
@@ -94,7 +94,7 @@ fn of_body(
     for azimuth_rad in AZIMUTHS_RAD {
         let camera = stage.camera(azimuth_rad, size_px);
         let shown = stage.shown(&camera);
-        let is_glass: Vec<bool> = shown.iter().map(|shown| matches!(shown, Shown::Glass(_))).collect();
+        let is_glass: Vec<bool> = shown.iter().map(|shown| matches!(shown, PixelContent::Glass(_))).collect();
         let truth = stage.truth(&camera, &shown);
         pictures.clear();
         pictures.push(picture(name, "rays", &truth)?);
@@ -134,23 +134,23 @@ impl Stage {
         PinholeCamera::looking_at(eye, middle, Vec3::Y, FOV_DEG.to_radians(), size_px)
     }
 
-    fn shown(&self, camera: &PinholeCamera) -> Vec<Shown> {
+    fn shown(&self, camera: &PinholeCamera) -> Vec<PixelContent> {
         let pixels = unit_rays(camera).map(|ray| {
             let met = self.room.meet(&ray, [NEAR_M, FAR_M]);
             let entry = self.body.entry(&ray);
             let is_nearer = |entry: &Entry| met.is_none_or(|met| met.t > entry.point.distance(entry.eye));
             match entry.filter(is_nearer) {
-                Some(entry) => Shown::Glass(entry),
-                None => Shown::Other(met.map(|met| met.color_linear)),
+                Some(entry) => PixelContent::Glass(entry),
+                None => PixelContent::Other(met.map(|met| met.color_linear)),
             }
         });
         pixels.collect()
     }
 
-    fn truth(&self, camera: &PinholeCamera, shown: &[Shown]) -> View {
+    fn truth(&self, camera: &PinholeCamera, shown: &[PixelContent]) -> View {
         let colors = unit_rays(camera).zip(shown).enumerate().map(|(pixel, (ray, shown))| match shown {
-            Shown::Other(color_linear) => srgb8(*color_linear),
-            Shown::Glass(_) => self.whole.closest(&ray, 0.0).map_or(SKY_SRGB, |first| {
+            PixelContent::Other(color_linear) => srgb8(*color_linear),
+            PixelContent::Glass(_) => self.whole.closest(&ray, 0.0).map_or(SKY_SRGB, |first| {
                 let passage = self.whole.through_glass(&ray, first, pixel as u32);
                 let color_linear = passage.hit.map(|hit| self.whole.look(&hit).base_linear);
                 dimmed(color_linear, passage.throughput_linear)
@@ -159,19 +159,19 @@ impl Stage {
         view(camera.size_px, colors.collect())
     }
 
-    fn view(&self, size_px: UVec2, shown: &[Shown], emerged: impl Fn(&[Entry]) -> Vec<Emerged>) -> View {
+    fn view(&self, size_px: UVec2, shown: &[PixelContent], emerged: impl Fn(&[Entry]) -> Vec<Emerged>) -> View {
         let entries: Vec<Entry> = shown
             .iter()
             .filter_map(|shown| match shown {
-                Shown::Glass(entry) => Some(*entry),
-                Shown::Other(_) => None,
+                PixelContent::Glass(entry) => Some(*entry),
+                PixelContent::Other(_) => None,
             })
             .collect();
         let ends: Vec<[u8; 3]> = emerged(&entries).par_iter().map(|emerged| self.end_of(emerged)).collect();
         let mut ends = ends.into_iter();
         let colors = shown.iter().map(|shown| match shown {
-            Shown::Other(color_linear) => srgb8(*color_linear),
-            Shown::Glass(_) => ends.next().unwrap_or(SKY_SRGB),
+            PixelContent::Other(color_linear) => srgb8(*color_linear),
+            PixelContent::Glass(_) => ends.next().unwrap_or(SKY_SRGB),
         });
         view(size_px, colors.collect())
     }

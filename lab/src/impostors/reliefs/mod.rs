@@ -13,7 +13,7 @@ use metrics::flip_map;
 use report::{Bar, Check, Picture, PictureRow, Report};
 
 use self::coverage::{DISTORTION, IMAGES, SINGLE_POLE};
-use self::park::{Drawn, DrawnReliefs, Park, ReliefPark, shadow_iou};
+use self::park::{Park, ParkPicture, ReliefPark, ReliefPicture, shadow_iou};
 use self::relief::ReliefImages;
 use crate::failures::stand::Stand;
 use crate::statistics::median;
@@ -35,7 +35,7 @@ const REPEATS: usize = 3;
 struct ParkRow {
     cars: u32,
     triangles: u64,
-    drawn: DrawnReliefs,
+    drawn: ReliefPicture,
     view_s: f64,
     sun_map_s: f64,
     paper_frames_per_s: Option<f64>,
@@ -137,7 +137,7 @@ fn by_images(stand: &Stand, park: &Park, size_px: UVec2, report: &mut Report) ->
     Ok(rows)
 }
 
-fn picture(name: &str, drawn: &Drawn) -> anyhow::Result<Picture> {
+fn picture(name: &str, drawn: &ParkPicture) -> anyhow::Result<Picture> {
     let view = &drawn.view;
     let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, view.srgb8.clone()).context("a picture")?;
     Ok(Picture::new(name, name, image))

@@ -34,14 +34,14 @@ pub struct Park {
 }
 
 /// A picture and its pixels in the shadow.
-pub struct Drawn {
+pub struct ParkPicture {
     pub view: View,
     pub in_shadow: Vec<bool>,
 }
 
 /// A picture by reliefs.
-pub struct DrawnReliefs {
-    pub drawn: Drawn,
+pub struct ReliefPicture {
+    pub drawn: ParkPicture,
     /// The share of pixels that show a relief.
     pub relief_ratio: f64,
     pub view_s: f64,
@@ -50,7 +50,7 @@ pub struct DrawnReliefs {
 
 /// What a pixel shows.
 #[derive(Clone, Copy)]
-struct Shown {
+struct ShownSurface {
     at: Vec3,
     color_linear: Vec3,
 }
@@ -98,14 +98,14 @@ impl Park {
     ///
     /// # Errors
     /// The device fails.
-    pub fn draw_triangles(&self, stand: &Stand, camera: &PinholeCamera) -> anyhow::Result<Drawn> {
+    pub fn draw_triangles(&self, stand: &Stand, camera: &PinholeCamera) -> anyhow::Result<ParkPicture> {
         let scene = if self.tints_srgb.is_empty() { barrels(self.count()) } else { car_park(self.count()) };
         let surfaces = Surfaces::new(stand, &scene)?;
         let shown = unit_rays(camera).map(|ray| {
             let met = surfaces.meet(&ray, [NEAR_M, FAR_M])?;
-            Some(Shown { at: ray.at(met.t), color_linear: met.color_linear })
+            Some(ShownSurface { at: ray.at(met.t), color_linear: met.color_linear })
         });
-        let shown: Vec<Option<Shown>> = shown.collect();
+        let shown: Vec<Option<ShownSurface>> = shown.collect();
         let in_shadow = shown.par_iter().map(|shown| {
             shown.is_some_and(|shown| {
                 let towards = Ray { origin_in_world: shown.at, direction_in_world: SUN.normalize_or_zero() };
@@ -127,15 +127,15 @@ impl<'s> ReliefPark<'s> {
 
     /// # Errors
     /// The device fails.
-    pub fn draw(&self, camera: &PinholeCamera) -> anyhow::Result<DrawnReliefs> {
+    pub fn draw(&self, camera: &PinholeCamera) -> anyhow::Result<ReliefPicture> {
         let sun = SunMap::draw(&self.relief, &self.placements, self.park.reach_m())?;
         let rays: Vec<Ray> = unit_rays(camera).collect();
         let reliefs = self.relief.follow(&self.placements, &rays, NEAR_M)?;
-        let shown: Vec<Option<Shown>> =
+        let shown: Vec<Option<ShownSurface>> =
             rays.par_iter().zip(&reliefs.hits).map(|(ray, hit)| self.shown(ray, hit.as_ref())).collect();
         let in_shadow = shown.par_iter().map(|shown| shown.is_some_and(|shown| sun.is_in_shadow(shown.at)));
         let hits = reliefs.hits.iter().flatten().count();
-        Ok(DrawnReliefs {
+        Ok(ReliefPicture {
             relief_ratio: hits as f64 / rays.len().max(1) as f64,
             view_s: reliefs.device_s,
             sun_map_s: sun.device_s,
@@ -144,13 +144,13 @@ impl<'s> ReliefPark<'s> {
     }
 
     /// The relief or the floor, by their depths in the world.
-    fn shown(&self, ray: &Ray, hit: Option<&ReliefHit>) -> Option<Shown> {
+    fn shown(&self, ray: &Ray, hit: Option<&ReliefHit>) -> Option<ShownSurface> {
         let floor = self.floor.meet(ray, [NEAR_M, FAR_M]);
         match hit {
             Some(hit) if floor.is_none_or(|floor| floor.t > hit.t) => {
-                Some(Shown { at: ray.at(hit.t), color_linear: self.tinted(hit) })
+                Some(ShownSurface { at: ray.at(hit.t), color_linear: self.tinted(hit) })
             }
-            _ => floor.map(|floor| Shown { at: ray.at(floor.t), color_linear: floor.color_linear }),
+            _ => floor.map(|floor| ShownSurface { at: ray.at(floor.t), color_linear: floor.color_linear }),
         }
     }
 
@@ -169,7 +169,7 @@ impl<'s> ReliefPark<'s> {
 }
 
 /// Pixels in either shadow that are in both.
-pub fn shadow_iou(a: &Drawn, b: &Drawn) -> f64 {
+pub fn shadow_iou(a: &ParkPicture, b: &ParkPicture) -> f64 {
     let pairs = || a.in_shadow.iter().zip(&b.in_shadow);
     let both = pairs().filter(|(a, b)| **a && **b).count();
     let either = pairs().filter(|(a, b)| **a || **b).count();
@@ -180,10 +180,10 @@ fn linear(color_srgb: Vec3) -> Vec3 {
     color_srgb.map(|channel| linear_from_srgb8(channel as u8))
 }
 
-fn drawn(size_px: UVec2, shown: &[Option<Shown>], in_shadow: Vec<bool>) -> Drawn {
+fn drawn(size_px: UVec2, shown: &[Option<ShownSurface>], in_shadow: Vec<bool>) -> ParkPicture {
     let pixels = shown.iter().zip(&in_shadow).flat_map(|(shown, is_dark)| {
         let light = if *is_dark { SHADOW } else { 1.0 };
         shown.map_or(SKY_SRGB, |shown| ToneMapping::NONE.srgb8(shown.color_linear * light))
     });
-    Drawn { view: View::from_srgb8(size_px, pixels.collect()), in_shadow }
+    ParkPicture { view: View::from_srgb8(size_px, pixels.collect()), in_shadow }
 }

@@ -117,17 +117,17 @@ impl<'s> Relief<'s> {
         let boxes: Vec<Vec<BoxEntry>> = rays.iter().map(|ray| placements.entries(ray)).collect();
         let mut found = ReliefHits { hits: vec![None; rays.len()], device_s: 0.0 };
         for round in 0.. {
-            let asked: Vec<Asked> = boxes
+            let in_boxes: Vec<RayInBox> = boxes
                 .iter()
                 .enumerate()
-                .filter_map(|(ray, boxes)| Some(Asked { ray, entry: *boxes.get(round)? }))
-                .filter(|asked| found.hits[asked.ray].is_none_or(|hit: ReliefHit| hit.t > asked.entry.t))
+                .filter_map(|(ray, boxes)| Some(RayInBox { ray, entry: *boxes.get(round)? }))
+                .filter(|in_box| found.hits[in_box.ray].is_none_or(|hit: ReliefHit| hit.t > in_box.entry.t))
                 .collect();
-            if asked.is_empty() {
+            if in_boxes.is_empty() {
                 break;
             }
-            for asked in asked.chunks(RAYS_AT_ONCE) {
-                self.follow_in_boxes(placements, rays, asked, near_m, &mut found)?;
+            for chunk in in_boxes.chunks(RAYS_AT_ONCE) {
+                self.follow_in_boxes(placements, rays, chunk, near_m, &mut found)?;
             }
         }
         Ok(found)
@@ -137,16 +137,16 @@ impl<'s> Relief<'s> {
         &self,
         placements: &Placements,
         rays: &[Ray],
-        asked: &[Asked],
+        in_boxes: &[RayInBox],
         near_m: f32,
         found: &mut ReliefHits,
     ) -> anyhow::Result<()> {
-        let in_object: Vec<Ray> = asked.iter().map(|asked| asked.in_object(placements, rays)).collect();
+        let in_object: Vec<Ray> = in_boxes.iter().map(|in_box| in_box.in_object(placements, rays)).collect();
         let (ends, device_s) = self.stand.reconstructor().follow(RayWork::new(&self.set, near_m), &in_object)?;
         found.device_s += device_s;
-        for (asked, end) in asked.iter().zip(ends) {
-            let hit = asked.hit(placements, &end);
-            let nearest = &mut found.hits[asked.ray];
+        for (in_box, end) in in_boxes.iter().zip(ends) {
+            let hit = in_box.hit(placements, &end);
+            let nearest = &mut found.hits[in_box.ray];
             if hit.is_some_and(|hit| nearest.is_none_or(|nearest| nearest.t > hit.t)) {
                 *nearest = hit;
             }
@@ -157,12 +157,12 @@ impl<'s> Relief<'s> {
 
 /// A ray, by its number, and a box that it enters.
 #[derive(Clone, Copy)]
-struct Asked {
+struct RayInBox {
     ray: usize,
     entry: BoxEntry,
 }
 
-impl Asked {
+impl RayInBox {
     /// The ray from the box on, of unit length in the object's space.
     fn in_object(&self, placements: &Placements, rays: &[Ray]) -> Ray {
         let ray = placements.get(self.entry.placement).in_object(&rays[self.ray]);
