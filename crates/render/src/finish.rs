@@ -104,12 +104,21 @@ impl ShaderVariant for Finish {
         let light = Output { light: true, ..plain };
         let passed = [Output { passed: true, ..plain }, Output { passed: true, ..light }];
         let covered = [plain, light].map(|output| Output { covered: true, ..output });
-        let images =
-            [plain, Output { antialias: Antialias::MOST, ..plain }, light].into_iter().chain(covered).chain(passed);
+        let averaged = Output { antialias: Antialias::MOST, ..plain };
+        let images = [plain, averaged, light].into_iter().chain(covered).chain(passed);
+        // Rays mark the pixels that show glass.
+        let through = [plain, averaged].map(|output| Output { glass: true, ..output });
+        let through = through.into_iter().flat_map(Self::of_images).filter(|variant| variant.by_rays);
         // Views have one eye.
         let bent = Self::of_images(plain).filter(|variant| variant.by_rays);
         let bent = bent.map(|variant| Self { single_pole: true, ..variant });
-        views.into_iter().flat_map(Self::of_output).chain(images.flat_map(Self::of_images)).chain(bent).collect()
+        views
+            .into_iter()
+            .flat_map(Self::of_output)
+            .chain(images.flat_map(Self::of_images))
+            .chain(bent)
+            .chain(through)
+            .collect()
     }
 }
 

@@ -159,13 +159,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
     }
+{% endif %}
 {%- if reflected %}
     // Glass of no reflectance has no highlight.
     for (var followed = met; followed; followed = false) {
         let first = 3u * (camera.first_word / {{ plane_count }}u + place);
         linear += vec3f(reflected[first], reflected[first + 1u], reflected[first + 2u]);
     }
-{%- endif %}
 {% endif %}
 {% if not light %}    for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
 {% endif %}{% if light %}{% elif samples and averaged %}

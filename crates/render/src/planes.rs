@@ -24,7 +24,7 @@ pub(crate) struct Output {
     pub mirrors: bool,
     /// Rays of lobes bring what mirrors do not show.
     pub glossy: bool,
-    /// Glass of a view shows what is behind it.
+    /// Glass shows what is behind it.
     pub glass: bool,
     pub normal: bool,
     pub reflector: bool,

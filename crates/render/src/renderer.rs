@@ -249,7 +249,9 @@ impl Renderer {
         let covered = covered_by.is_some();
         let triangle_normal = planes.light || covered;
         let passed = sequence.is_some();
-        let output = Output { covered, triangle_normal, passed, ..images_output(work, planes) };
+        // Single poles have no eye that all rays of glass come from.
+        let glass = !planes.light && is_seen_through(work) && cameras.iter().all(|camera| camera.pinhole().is_some());
+        let output = Output { covered, triangle_normal, passed, glass, ..images_output(work, planes) };
         let request = Batch { sequence, covered_by, ..Batch::new(work, output) };
         let mut images = self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
@@ -452,8 +454,13 @@ fn views_output(work: DrawWork<'_>) -> Output {
     let highlight = work.highlight();
     let glossy = highlight.is_some() && work.lighting.glossy_rays() > 0;
     let mirrors = highlight.is_some() && work.lighting.without_reflections().is_some();
-    let glass = highlight == Some(Highlight::Ggx) && work.scene.has_glass();
+    let glass = is_seen_through(work);
     Output { highlight, mirrors, glossy, glass, ..Output::of(work, highlight.is_some()) }
+}
+
+/// Whether rays go through the glass of pictures.
+fn is_seen_through(work: DrawWork<'_>) -> bool {
+    work.highlight() == Some(Highlight::Ggx) && work.scene.has_glass()
 }
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes) -> Output {

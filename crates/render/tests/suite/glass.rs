@@ -2,7 +2,7 @@
 
 use depth_image::{
     Camera, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, Ray, View, ViewPlanes,
-    environment_reflectance_linear,
+    environment_reflectance_linear, linear_from_rgb9e5,
 };
 use fixtures::{clear_glass, glass, quad, unit_cube, uv_sphere};
 use glam::{Affine3A, UVec2, Vec3};
@@ -162,6 +162,28 @@ fn pixels_of_glass_show_what_their_twins_meet() {
     println!("glass: {same} of {compared} pixels show what their twins meet");
     assert!(compared > 5000, "{compared}");
     assert!(same * 200 >= compared * 197, "{same} of {compared}");
+}
+
+/// Without lamps and environment glass has no highlights, which are not in samples.
+#[test]
+fn samples_of_glass_show_what_their_cameras_see_through_it() {
+    let on_device = upload(&shown_as_it_is());
+    let camera = before_the_glass(UVec2::new(192, 144));
+    let view = view_of(&on_device, "shadows", &camera);
+    let samples = image(work(&on_device, "shadows"), &camera);
+    let glass = glass_pixels(&on_device, &camera);
+    let colors = pixels(camera.size_px).zip(&samples.color_rgb9e5).zip(&glass).filter(|(_, is_glass)| **is_glass);
+    let off = colors.map(|((pixel, color), _)| {
+        let off = code_of(linear_from_rgb9e5(*color)) - code_of(linear_at(&view, pixel));
+        off.abs().max_element()
+    });
+    let off: Vec<f32> = off.collect();
+    let same = off.iter().filter(|off| **off <= ROUNDING as f32).count();
+    assert!(off.len() > 5000 && same * 200 >= off.len() * 199, "{same} of {}", off.len());
+    // Views go through the glass of samples of light themselves.
+    let light = device().1.draw_depth_images(work(&on_device, "shadows"), &[camera.into()], LIGHT).expect("light");
+    let lamps = &light[0].light.as_ref().expect("light").lamps_rgb9e5;
+    assert!(lamps.iter().all(|light| *light == 0));
 }
 
 #[test]
