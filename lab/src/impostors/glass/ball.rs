@@ -229,6 +229,9 @@ mod tests {
             assert!(one.median_deg > 2.0 * wyman.median_deg, "{ior}: {} {}", one.median_deg, wyman.median_deg);
             assert!(inside.reflected_ratio < 0.01 && wyman.reflected_ratio > 0.05, "{ior}");
             guesses_deg.push(wyman.median_deg);
+            let by_incidence = ball.by_incidence(INSIDE);
+            let mut below_grazing = by_incidence.points.iter().filter(|point| point.x <= 85.0);
+            assert!(below_grazing.all(|point| point.y < 1.0), "{ior}: {:?}", by_incidence.points);
         }
         assert!(guesses_deg.windows(2).all(|pair| pair[1] > 2.0 * pair[0]), "{guesses_deg:?}");
     }
