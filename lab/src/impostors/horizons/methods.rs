@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use depth_image::PinholeCamera;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::search::HorizonSearch;
@@ -239,6 +239,3 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     }
     sum / count.max(1) as f64
 }
-
-/// The size of the views along the walk.
-pub const VIEW_PX: [UVec2; 2] = [UVec2::new(640, 480), UVec2::new(320, 240)];

@@ -7,15 +7,17 @@ mod search;
 mod subject;
 
 use anyhow::Context as _;
+use glam::UVec2;
 use report::{Axis, Bar, Check, Point, Report, Series, XyChart};
 
-use self::methods::{COLUMNS, GRAPH, KEPT, METHODS, MethodFigures, OWN, SHARED, VIEW_PX, Walk};
+use self::methods::{COLUMNS, GRAPH, KEPT, METHODS, MethodFigures, OWN, SHARED, Walk};
 use self::subject::{ARC_RAD, Blocks, view};
 use crate::failures::stand::Stand;
 use crate::study::{measure_rows, table};
 
 /// Views along the walk, in full and in quick runs.
 const VIEWS: [usize; 2] = [21, 9];
+const VIEW_PX: [UVec2; 2] = [UVec2::new(640, 480), UVec2::new(320, 240)];
 
 /// Adds table, chart, checks and pictures to a report.
 ///
