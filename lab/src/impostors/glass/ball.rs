@@ -189,14 +189,17 @@ fn by_ior(rows: &[BallRow]) -> XyChart {
     })
 }
 
+fn find<'r>(rows: &'r [BallRow], method: &str) -> Option<&'r BallRow> {
+    rows.iter().find(|row| row.ior == IOR && row.method == method)
+}
+
 fn checks(rows: &[BallRow]) -> Vec<Check> {
-    let row = |method: &str| rows.iter().find(|row| row.ior == IOR && row.method == method);
     let mut checks = Vec::new();
-    if let Some(inside) = row(INSIDE) {
+    if let Some(inside) = find(rows, INSIDE) {
         checks.push(Check::new("ball, n = 1.5, inside images: median", inside.median_deg, "°", Bar::AtMost(0.5)));
         checks.push(Check::new("ball, n = 1.5, inside images: 95 %", inside.most_deg, "°", Bar::AtMost(2.0)));
     }
-    if let Some(wyman) = row(WYMAN) {
+    if let Some(wyman) = find(rows, WYMAN) {
         checks.push(Check::new("ball, n = 1.5, Wyman: median, at least", wyman.median_deg, "°", Bar::AtLeast(1.3)));
         checks.push(Check::new("ball, n = 1.5, Wyman: median, at most", wyman.median_deg, "°", Bar::AtMost(2.7)));
     }

@@ -137,6 +137,12 @@ impl Body {
         }
     }
 
+    /// The body's depth from an entry on, in one direction.
+    fn depth_m(&self, entry: &Entry, direction_in_world: Vec3) -> f32 {
+        let ray = Ray { origin_in_world: entry.point, direction_in_world };
+        self.backs.closest(&ray, self.near_m()).map_or(0.0, |hit| hit.t)
+    }
+
     /// One interface: the ray inside goes on for ever.
     pub fn by_one_interface(&self, entry: &Entry) -> Emerged {
         let throughput_linear = Vec3::splat(self.passes_first(entry));
@@ -147,15 +153,10 @@ impl Body {
     /// sees of the backs at that place. Backs are looked up by rays, at no texels' cost.
     pub fn by_wyman(&self, entry: &Entry) -> Emerged {
         let inner = self.inner(entry);
-        let near_m = self.near_m();
-        let depth_m = |direction_in_world: Vec3| {
-            let ray = Ray { origin_in_world: entry.point, direction_in_world };
-            self.backs.closest(&ray, near_m).map_or(0.0, |hit| hit.t)
-        };
         let [outside, inside] =
             [entry.direction, inner.direction_in_world].map(|way| (-way).angle_between(entry.normal));
         let share = if outside > 1e-4 { inside / outside } else { 1.0 / self.ior };
-        let way_m = share * depth_m(entry.direction) + (1.0 - share) * depth_m(-entry.normal);
+        let way_m = share * self.depth_m(entry, entry.direction) + (1.0 - share) * self.depth_m(entry, -entry.normal);
         let towards = (inner.at(way_m) - entry.eye).normalize_or(entry.direction);
         let look = Ray { origin_in_world: entry.eye, direction_in_world: towards };
         let so_far = Vec3::splat(self.passes_first(entry));

@@ -71,13 +71,14 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
         report.pictures.push(pictures);
     }
     report.tables.push(table("Views of the scene glass, one body at a time", &COLUMNS, &rows)?);
-    let mean = |method: &str| {
-        let flips: Vec<f64> = rows.iter().filter(|row| row.method == method).map(|row| row.flip).collect();
-        mean_of(&flips, |flip| *flip)
-    };
-    let ratio = mean(INSIDE) / mean(WYMAN);
+    let ratio = mean_flip(&rows, INSIDE) / mean_flip(&rows, WYMAN);
     report.checks.push(Check::new("FLIP over glass: inside images over Wyman", ratio, "×", Bar::AtMost(0.8)));
     Ok(())
+}
+
+fn mean_flip(rows: &[BodyRow], method: &str) -> f64 {
+    let flips: Vec<f64> = rows.iter().filter(|row| row.method == method).map(|row| row.flip).collect();
+    mean_of(&flips, |flip| *flip)
 }
 
 fn of_body(
@@ -138,8 +139,8 @@ impl Stage {
         let pixels = unit_rays(camera).map(|ray| {
             let met = self.room.meet(&ray, [NEAR_M, FAR_M]);
             let entry = self.body.entry(&ray);
-            let is_nearer = |entry: &Entry| met.is_none_or(|met| met.t > entry.point.distance(entry.eye));
-            match entry.filter(is_nearer) {
+            let entry = entry.filter(|entry| met.is_none_or(|met| met.t > entry.point.distance(entry.eye)));
+            match entry {
                 Some(entry) => PixelContent::Glass(entry),
                 None => PixelContent::Other(met.map(|met| met.color_linear)),
             }

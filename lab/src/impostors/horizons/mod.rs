@@ -48,17 +48,23 @@ fn along_walk(angles: &[f32], truth: &[f64], rows: &[MethodFigures]) -> XyChart 
         Axis::linear("angle", "rad"),
         Axis::linear("mean occlusion", ""),
     );
-    let series = |name: &str, values: &[f64]| {
-        let points = angles.iter().zip(values).map(|(angle, value)| Point::from((f64::from(*angle), *value)));
-        Series::line(name, points)
-    };
     let shown = rows.iter().filter(|row| [OWN, GRAPH, KEPT, SHARED].contains(&row.name));
-    shown.fold(chart.with(series("rays", truth)), |chart, row| chart.with(series(row.name, &row.by_view)))
+    shown.fold(chart.with(series("rays", angles, truth)), |chart, row| {
+        chart.with(series(row.name, angles, &row.by_view))
+    })
+}
+
+fn series(name: &str, angles: &[f32], values: &[f64]) -> Series {
+    let points = angles.iter().zip(values).map(|(angle, value)| Point::from((f64::from(*angle), *value)));
+    Series::line(name, points)
+}
+
+fn find<'r>(rows: &'r [MethodFigures], name: &str) -> anyhow::Result<&'r MethodFigures> {
+    rows.iter().find(|row| row.name == name).with_context(|| format!("{name} was not measured"))
 }
 
 fn checks(walk: &Walk<'_>, rows: &[MethodFigures]) -> anyhow::Result<Vec<Check>> {
-    let row = |name: &str| rows.iter().find(|row| row.name == name).with_context(|| format!("{name} was not measured"));
-    let [own, graph, shared] = [row(OWN)?, row(GRAPH)?, row(SHARED)?];
+    let [own, graph, shared] = [find(rows, OWN)?, find(rows, GRAPH)?, find(rows, SHARED)?];
     let truth = walk.truth_by_view();
     let middle = truth[truth.len() / 2];
     Ok(vec![

@@ -48,9 +48,12 @@ impl HalfPlane {
 
     /// Light from the directions between two angles, by the cosine to the normal.
     fn light_between(&self, [first, last]: [f64; 2]) -> f64 {
+        self.weight * (self.integral_until(last) - self.integral_until(first))
+    }
+
+    fn integral_until(&self, angle: f64) -> f64 {
         let gamma = self.normal_angle;
-        let until = |angle: f64| 0.25 * (2.0 * angle * gamma.sin() - (2.0 * angle - gamma).cos());
-        self.weight * (until(last) - until(first))
+        0.25 * (2.0 * angle * gamma.sin() - (2.0 * angle - gamma).cos())
     }
 }
 

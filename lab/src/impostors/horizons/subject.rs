@@ -104,7 +104,7 @@ impl Blocks {
         let (right, ahead) = normal.any_orthonormal_pair();
         let blocked = (0..rays).filter(|&number| {
             let share = (number as f32 + 0.5) / rays as f32;
-            let (sin, cos) = (turned_rad + std::f32::consts::TAU * radical_inverse(number)).sin_cos();
+            let (sin, cos) = f32::sin_cos(turned_rad + std::f32::consts::TAU * radical_inverse(number));
             let out = share.sqrt();
             let towards = right * (out * cos) + ahead * (out * sin) + normal * (1.0 - share).sqrt();
             self.0.is_blocked(

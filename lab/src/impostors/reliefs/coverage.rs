@@ -4,10 +4,10 @@ use depth_image::{PinholeCamera, Ray};
 use fixtures::car;
 use glam::{Affine3A, UVec2, Vec3};
 use rayon::prelude::*;
-use report::{Axis, Bar, Check, Mark, Report, XyChart};
+use report::{Axis, Bar, Check, Mark, Point, Report, XyChart};
 
 use super::placements::Placements;
-use super::relief::{Relief, ReliefImages};
+use super::relief::{NEAR_M, Relief, ReliefImages};
 use crate::failures::stand::Stand;
 use crate::impostors::rays::unit_rays;
 use crate::impostors::surfaces::Surfaces;
@@ -24,7 +24,6 @@ const VIEWS: u32 = 6;
 const VIEW_PX: [UVec2; 2] = [UVec2::new(640, 480), UVec2::new(320, 240)];
 const DISTANCE_M: f32 = 14.0;
 const FOV_RAD: f32 = 0.32;
-const NEAR_M: f32 = 1e-3;
 /// Ends within this share of the car's length are right.
 const RIGHT: f32 = 0.01;
 
@@ -46,6 +45,12 @@ struct CoverageRow {
     elevation_deg: f32,
     found_ratio: f64,
     wrong_ratio: f64,
+}
+
+impl CoverageRow {
+    fn point(&self) -> Point {
+        Point::from((f64::from(self.elevation_deg), self.found_ratio * 100.0))
+    }
 }
 
 const COLUMNS: [Column<CoverageRow>; 5] = [
@@ -121,8 +126,7 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
         Axis::linear("elevation", "°"),
         Axis::linear("found", "%"),
     );
-    let point = |row: &CoverageRow| (f64::from(row.elevation_deg), row.found_ratio * 100.0).into();
-    report.charts.push(with_series(chart, &rows, Mark::Line, |row| row.images.clone(), point));
+    report.charts.push(with_series(chart, &rows, Mark::Line, |row| row.images.clone(), CoverageRow::point));
     report.checks.extend(checks(&rows));
     by_distortion(stand, &from_elevations[1].1, report)
 }
@@ -136,17 +140,18 @@ fn by_distortion(stand: &Stand, rays: &CarRays, report: &mut Report) -> anyhow::
     Ok(())
 }
 
+fn found_at_bar(rows: &[CoverageRow], images: &str) -> f64 {
+    let row = rows.iter().find(|row| row.images == images && row.elevation_deg == BAR_DEG);
+    row.map_or(f64::NAN, |row| row.found_ratio)
+}
+
 fn checks(rows: &[CoverageRow]) -> Vec<Check> {
-    let found = |images: &str| {
-        let row = rows.iter().find(|row| row.images == images && row.elevation_deg == BAR_DEG);
-        row.map_or(f64::NAN, |row| row.found_ratio)
-    };
-    let single_pole = found(SINGLE_POLE);
+    let single_pole = found_at_bar(rows, SINGLE_POLE);
     vec![
         Check::new("a car from 15°: found in a single pole", single_pole, "", Bar::AtLeast(0.85)),
         Check::new(
             "a car from 15°: a single pole less a pinhole",
-            single_pole - found(PINHOLE),
+            single_pole - found_at_bar(rows, PINHOLE),
             "",
             Bar::AtLeast(0.12),
         ),

@@ -88,16 +88,19 @@ fn by_cars(stand: &Stand, size_px: UVec2, report: &mut Report) -> anyhow::Result
     let rows = measure_rows("parks", CARS, |(cars, paper_frames_per_s)| {
         park_row(stand, &Park::of_cars(cars), size_px, paper_frames_per_s)
     })?;
-    let row = |cars: u32| rows.iter().find(|row| row.cars == cars).context("a park");
-    let ratio = row(MANY)?.view_s / row(FEW)?.view_s;
+    let ratio = find(&rows, MANY)?.view_s / find(&rows, FEW)?.view_s;
     report.checks.push(Check::new("reliefs: time of 40 cars over 10 (the paper: 3.6)", ratio, "×", Bar::AtMost(4.0)));
-    let most = &row(MOST)?.drawn;
+    let most = &find(&rows, MOST)?.drawn;
     let check = Check::new("car-park:1200 by reliefs: pixels of cars", most.relief_ratio, "", Bar::AtLeast(0.05));
     report.checks.push(check);
     let pictures = vec![picture("car-park:1200 by reliefs", &most.drawn)?];
     report.pictures.push(PictureRow { title: "car-park:1200: 24 million triangles, as reliefs".into(), pictures });
     report.tables.push(table("Parks by reliefs of one single pole, on the device", &COLUMNS, &rows)?);
     Ok(())
+}
+
+fn find(rows: &[ParkRow], cars: u32) -> anyhow::Result<&ParkRow> {
+    rows.iter().find(|row| row.cars == cars).context("a park")
 }
 
 fn park_row(stand: &Stand, park: &Park, size_px: UVec2, paper_frames_per_s: Option<f64>) -> anyhow::Result<ParkRow> {

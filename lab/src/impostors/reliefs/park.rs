@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use scene::Scene;
 
 use super::placements::Placements;
-use super::relief::{Relief, ReliefHit, ReliefImages};
+use super::relief::{NEAR_M, Relief, ReliefHit, ReliefImages};
 use super::sun::{SUN, SunMap};
 use crate::failures::stand::Stand;
 use crate::impostors::rays::unit_rays;
@@ -15,8 +15,7 @@ use crate::impostors::surfaces::Surfaces;
 
 /// What is left of a colour in the shadow.
 const SHADOW: f32 = 0.45;
-/// Rays meet nothing nearer to their origin; shadow rays begin on a surface.
-pub const NEAR_M: f32 = 1e-3;
+/// Shadow rays begin on a surface.
 const SHADOW_NEAR_M: f32 = 0.02;
 const FAR_M: f32 = 1e3;
 const SKY_SRGB: [u8; 3] = [168, 196, 224];
@@ -161,7 +160,6 @@ impl<'s> ReliefPark<'s> {
             return hit.color_linear;
         }
         let key_linear = linear(CAR_SRGB);
-        let yellow = |color: Vec3| (color.x.min(color.y) - color.z).max(0.0);
         let share = (yellow(hit.color_linear) / yellow(key_linear)).min(1.0);
         let tint_linear = linear(tints[hit.placement % tints.len()]);
         (hit.color_linear + (tint_linear - key_linear) * share).max(Vec3::ZERO)
@@ -170,10 +168,14 @@ impl<'s> ReliefPark<'s> {
 
 /// Pixels in either shadow that are in both.
 pub fn shadow_iou(a: &ParkPicture, b: &ParkPicture) -> f64 {
-    let pairs = || a.in_shadow.iter().zip(&b.in_shadow);
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    let either = pairs().filter(|(a, b)| **a || **b).count();
+    let pairs = a.in_shadow.iter().zip(&b.in_shadow);
+    let both = pairs.clone().filter(|(a, b)| **a && **b).count();
+    let either = pairs.filter(|(a, b)| **a || **b).count();
     both as f64 / either.max(1) as f64
+}
+
+fn yellow(color: Vec3) -> f32 {
+    (color.x.min(color.y) - color.z).max(0.0)
 }
 
 fn linear(color_srgb: Vec3) -> Vec3 {

@@ -12,6 +12,8 @@ use super::placements::{BoxEntry, Placements};
 use crate::failures::stage::in_the_dark;
 use crate::failures::stand::Stand;
 
+/// Rays of views meet nothing nearer to their origin.
+pub const NEAR_M: f32 = 1e-3;
 /// Texels of all images of an object.
 const TEXELS: f32 = 262_144.0;
 const SIDE_PX: UVec2 = UVec2::splat(512);
@@ -64,21 +66,24 @@ impl ReliefImages {
     fn cameras(self, bounds: &Aabb) -> Vec<Camera> {
         let middle = bounds.center();
         let away_m = DISTANCE * 0.5 * bounds.size().length();
-        let single_pole = |eye: Vec3, distortion: f32| -> Camera {
-            let distortion_px = distortion * 0.5 * SIDE_PX.x as f32;
-            Camera::SinglePole(SinglePoleCamera::around(bounds, eye, distortion_px, SIDE_PX))
-        };
         let above = middle + Vec3::Y * away_m;
         let cameras = match self {
             Self::Pinhole => vec![SinglePoleCamera::around(bounds, above, 0.0, SIDE_PX).reference.into()],
-            Self::SinglePole(distortion) => vec![single_pole(above, distortion)],
+            Self::SinglePole(distortion) => vec![single_pole(bounds, above, distortion)],
             Self::TwoSinglePoles(distortion) => [-1.0, 1.0]
-                .map(|side| single_pole(middle + Vec3::new(0.0, 1.0, side).normalize_or_zero() * away_m, distortion))
+                .map(|side| {
+                    single_pole(bounds, middle + Vec3::new(0.0, 1.0, side).normalize_or_zero() * away_m, distortion)
+                })
                 .into(),
             Self::FourPinholes => (0..4).map(|side| from_side(bounds, side).into()).collect(),
         };
         Camera::resized_together(&cameras, TEXELS, 1)
     }
+}
+
+fn single_pole(bounds: &Aabb, eye: Vec3, distortion: f32) -> Camera {
+    let distortion_px = distortion * 0.5 * SIDE_PX.x as f32;
+    Camera::SinglePole(SinglePoleCamera::around(bounds, eye, distortion_px, SIDE_PX))
 }
 
 /// A pinhole that looks down at a box from one of four sides.

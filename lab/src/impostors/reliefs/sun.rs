@@ -4,9 +4,8 @@ use depth_image::{PinholeCamera, Ray};
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 
-use super::park::NEAR_M;
 use super::placements::Placements;
-use super::relief::Relief;
+use super::relief::{NEAR_M, Relief};
 use crate::impostors::rays::unit_rays;
 
 /// The way to the sun.
