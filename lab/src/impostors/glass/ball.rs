@@ -12,6 +12,7 @@ use super::body::{Body, Emerged, Entry};
 use super::inside::{InsideImages, cameras};
 use crate::failures::stand::Stand;
 use crate::graph::GraphCamera;
+use crate::statistics::quantile;
 use crate::study::{Column, measure_rows, table};
 
 const IOR: f32 = 1.5;
@@ -102,15 +103,12 @@ impl<'c> Ball<'c> {
         let emerged = self.emerged(method, &entries);
         let reflected = emerged.iter().filter(|emerged| emerged.is_reflected).count();
         let pairs = entries.iter().zip(&emerged).filter(|(entry, _)| entry.eye.truncate().length() < WITHIN);
-        let mut errors: Vec<f64> = pairs.map(|(entry, emerged)| self.error_deg(entry, emerged)).collect();
-        errors.sort_by(f64::total_cmp);
-        let at =
-            |share: f64| errors.get(((errors.len().max(1) - 1) as f64 * share) as usize).copied().unwrap_or(f64::NAN);
+        let errors: Vec<f64> = pairs.map(|(entry, emerged)| self.error_deg(entry, emerged)).collect();
         BallRow {
             ior: self.body.ior,
             method,
-            median_deg: at(0.5),
-            most_deg: at(0.95),
+            median_deg: quantile(errors.clone(), 0.5),
+            most_deg: quantile(errors, 0.95),
             reflected_ratio: reflected as f64 / emerged.len().max(1) as f64,
         }
     }

@@ -28,16 +28,18 @@ pub fn head_on(blocks: &Blocks, is_quick: bool) -> anyhow::Result<PictureRow> {
     let graph = blocks.image(&graph_camera);
     let set = set_cameras(size_px).iter().map(pinhole).collect::<anyhow::Result<Vec<GraphCamera>>>()?;
     let shared: Vec<GraphImage<'_>> = set.iter().map(|camera| blocks.image(camera)).collect();
-    let by_rays =
-        |at: SurfacePoint| blocks.by_rays(at.point.as_vec3(), at.normal.as_vec3(), RAYS[size], pattern_turn(at.point));
     let pictures = [
         ("own z-buffer", picture(&own, |at| FINE.in_image(&own, at).unwrap_or(0.0))),
         ("graph camera's z-buffer", picture(&own, |at| FINE.in_image(&graph, at).unwrap_or(0.0))),
         ("four images of a set", picture(&own, |at| FINE.in_any_image(&shared, at))),
-        ("rays", picture(&own, by_rays)),
+        ("rays", picture(&own, |at| by_rays(blocks, at, RAYS[size]))),
     ];
     let pictures = pictures.map(|(name, picture)| Picture::new(format!("hidden-block by {name}"), name, picture));
     Ok(PictureRow { title: "hidden-block: ambient occlusion (Fig. 3)".into(), pictures: pictures.into() })
+}
+
+fn by_rays(blocks: &Blocks, at: SurfacePoint, rays: u32) -> f64 {
+    blocks.by_rays(at.point.as_vec3(), at.normal.as_vec3(), rays, pattern_turn(at.point))
 }
 
 /// A turn of the rays that differs from point to point.
