@@ -107,7 +107,7 @@ impl ShaderVariant for Finish {
         let averaged = Output { antialias: Antialias::MOST, ..plain };
         let images = [plain, averaged, light].into_iter().chain(covered).chain(passed);
         // Rays mark the pixels that show glass.
-        let through = [plain, averaged].map(|output| Output { glass: true, ..output });
+        let through = [plain, averaged, covered[0], passed[0]].map(|output| Output { glass: true, ..output });
         let through = through.into_iter().flat_map(Self::of_images).filter(|variant| variant.by_rays);
         // Views have one eye.
         let bent = Self::of_images(plain).filter(|variant| variant.by_rays);

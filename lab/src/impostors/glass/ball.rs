@@ -1,5 +1,6 @@
 //! Directions of rays that have gone through a ball, against their closed form.
 
+use anyhow::Context as _;
 use depth_image::Ray;
 use fixtures::{clear_glass, uv_sphere};
 use glam::{Vec2, Vec3};
@@ -29,16 +30,32 @@ const WITHIN: f32 = 0.95;
 /// The viewer is so far away that its rays are parallel.
 const EYE_M: f32 = 1000.0;
 
-/// The ways through a body.
-pub const ONE_INTERFACE: &str = "one interface";
-pub const WYMAN: &str = "Wyman";
-pub const INSIDE: &str = "inside images";
-pub const METHODS: [&str; 3] = [ONE_INTERFACE, WYMAN, INSIDE];
+/// Ways to find the second surface of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SecondSurface {
+    /// There is none: the ray goes on as the first surface bends it.
+    OneInterface,
+    /// The paper's guess (Wyman 2005).
+    Wyman,
+    InsideImages,
+}
+
+impl SecondSurface {
+    pub const ALL: [Self; 3] = [Self::OneInterface, Self::Wyman, Self::InsideImages];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OneInterface => "one interface",
+            Self::Wyman => "Wyman",
+            Self::InsideImages => "inside images",
+        }
+    }
+}
 
 /// Errors of one way through a ball.
 struct BallRow {
     ior: f32,
-    method: &'static str,
+    method: SecondSurface,
     /// Errors in degrees, of rays within [`WITHIN`].
     median_deg: f64,
     most_deg: f64,
@@ -48,7 +65,7 @@ struct BallRow {
 
 const COLUMNS: [Column<BallRow>; 5] = [
     Column::new("n", |row| row.ior.into()),
-    Column::new("the second surface", |row| row.method.into()),
+    Column::new("the second surface", |row| row.method.name().into()),
     Column::with_unit("median", "°", |row| row.median_deg.into()),
     Column::with_unit("95 %", "°", |row| row.most_deg.into()),
     Column::with_unit("totally reflected", "%", |row| (row.reflected_ratio * 100.0).into()),
@@ -71,7 +88,7 @@ impl<'c> Ball<'c> {
         Self { body, inside: InsideImages::take(cameras, body) }
     }
 
-    fn emerged(&self, method: &str, entries: &[Entry]) -> Vec<Emerged> {
+    fn emerged(&self, method: SecondSurface, entries: &[Entry]) -> Vec<Emerged> {
         emerged(self.body, &self.inside, method, entries)
     }
 
@@ -97,7 +114,7 @@ impl<'c> Ball<'c> {
         f64::from(found.cross(expected).length().atan2(found.dot(expected)).to_degrees())
     }
 
-    fn row(&self, method: &'static str) -> BallRow {
+    fn row(&self, method: SecondSurface) -> BallRow {
         let places = (0..RAYS).map(|number| point_of(number, 3) * 2.0 - 1.0).filter(|place| place.length() < 1.0);
         let entries = self.entries(&places.collect::<Vec<Vec2>>());
         let emerged = self.emerged(method, &entries);
@@ -114,7 +131,7 @@ impl<'c> Ball<'c> {
     }
 
     /// Mean errors at the angles of incidence.
-    fn by_incidence(&self, method: &'static str) -> Series {
+    fn by_incidence(&self, method: SecondSurface) -> Series {
         let mut points = Vec::new();
         for incidence_deg in INCIDENCES_DEG {
             let places = (0..AROUND).map(|number| {
@@ -127,16 +144,16 @@ impl<'c> Ball<'c> {
             let mean_deg = errors.sum::<f64>() / entries.len().max(1) as f64;
             points.push(Point::from((f64::from(incidence_deg), mean_deg)));
         }
-        Series::line(method, points)
+        Series::line(method.name(), points)
     }
 }
 
-/// Follows rays through a body by one of [`METHODS`].
-pub fn emerged(body: &Body, inside: &InsideImages<'_>, method: &str, entries: &[Entry]) -> Vec<Emerged> {
+/// Follows rays through a body by one way.
+pub fn emerged(body: &Body, inside: &InsideImages<'_>, method: SecondSurface, entries: &[Entry]) -> Vec<Emerged> {
     match method {
-        INSIDE => inside.emerged(body, entries),
-        WYMAN => entries.par_iter().map(|entry| body.by_wyman(entry)).collect(),
-        _ => entries.par_iter().map(|entry| body.by_one_interface(entry)).collect(),
+        SecondSurface::InsideImages => inside.emerged(body, entries),
+        SecondSurface::Wyman => entries.par_iter().map(|entry| body.by_wyman(entry)).collect(),
+        SecondSurface::OneInterface => entries.par_iter().map(|entry| body.by_one_interface(entry)).collect(),
     }
 }
 
@@ -149,7 +166,7 @@ pub fn measure(stand: &Stand, report: &mut Report) -> anyhow::Result<()> {
         let body = body(stand, ior)?;
         let cameras = cameras(&body)?;
         let ball = Ball::new(&body, &cameras);
-        Ok(METHODS.map(|method| ball.row(method)))
+        Ok(SecondSurface::ALL.map(|method| ball.row(method)))
     })?;
     let rows: Vec<BallRow> = rows.into_iter().flatten().collect();
     report.tables.push(table(
@@ -158,7 +175,7 @@ pub fn measure(stand: &Stand, report: &mut Report) -> anyhow::Result<()> {
         &rows,
     )?);
     report.charts.push(by_ior(&rows));
-    report.checks.extend(checks(&rows));
+    report.checks.extend(checks(&rows)?);
     let body = body(stand, IOR)?;
     let cameras = cameras(&body)?;
     let ball = Ball::new(&body, &cameras);
@@ -168,7 +185,9 @@ pub fn measure(stand: &Stand, report: &mut Report) -> anyhow::Result<()> {
         Axis::linear("incidence", "°"),
         Axis::linear("error", "°"),
     );
-    report.charts.push(METHODS.map(|method| ball.by_incidence(method)).into_iter().fold(chart, XyChart::with));
+    report
+        .charts
+        .push(SecondSurface::ALL.map(|method| ball.by_incidence(method)).into_iter().fold(chart, XyChart::with));
     Ok(())
 }
 
@@ -178,30 +197,29 @@ fn by_ior(rows: &[BallRow]) -> XyChart {
         Axis::linear("n", ""),
         Axis::log("error", "°"),
     );
-    METHODS.iter().fold(chart, |chart, &method| {
+    SecondSurface::ALL.into_iter().fold(chart, |chart, method| {
         let of_method = rows.iter().filter(|row| row.method == method);
         chart.with(Series::line(
-            method,
+            method.name(),
             of_method.map(|row| Point::from((f64::from(row.ior), row.median_deg.max(1e-3)))),
         ))
     })
 }
 
-fn find<'r>(rows: &'r [BallRow], method: &str) -> Option<&'r BallRow> {
-    rows.iter().find(|row| row.ior == IOR && row.method == method)
+fn find(rows: &[BallRow], method: SecondSurface) -> anyhow::Result<&BallRow> {
+    let row = rows.iter().find(|row| row.ior == IOR && row.method == method);
+    row.with_context(|| format!("{} was not measured", method.name()))
 }
 
-fn checks(rows: &[BallRow]) -> Vec<Check> {
-    let mut checks = Vec::new();
-    if let Some(inside) = find(rows, INSIDE) {
-        checks.push(Check::new("ball, n = 1.5, inside images: median", inside.median_deg, "°", Bar::AtMost(0.5)));
-        checks.push(Check::new("ball, n = 1.5, inside images: 95 %", inside.most_deg, "°", Bar::AtMost(2.0)));
-    }
-    if let Some(wyman) = find(rows, WYMAN) {
-        checks.push(Check::new("ball, n = 1.5, Wyman: median, at least", wyman.median_deg, "°", Bar::AtLeast(1.3)));
-        checks.push(Check::new("ball, n = 1.5, Wyman: median, at most", wyman.median_deg, "°", Bar::AtMost(2.7)));
-    }
-    checks
+fn checks(rows: &[BallRow]) -> anyhow::Result<Vec<Check>> {
+    let inside = find(rows, SecondSurface::InsideImages)?;
+    let wyman = find(rows, SecondSurface::Wyman)?;
+    Ok(vec![
+        Check::new("ball, n = 1.5, inside images: median", inside.median_deg, "°", Bar::AtMost(0.5)),
+        Check::new("ball, n = 1.5, inside images: 95 %", inside.most_deg, "°", Bar::AtMost(2.0)),
+        Check::new("ball, n = 1.5, Wyman: median, at least", wyman.median_deg, "°", Bar::AtLeast(1.3)),
+        Check::new("ball, n = 1.5, Wyman: median, at most", wyman.median_deg, "°", Bar::AtMost(2.7)),
+    ])
 }
 
 #[cfg(test)]
@@ -220,7 +238,7 @@ mod tests {
             let body = body(&stand, ior).unwrap();
             let cameras = cameras(&body).unwrap();
             let ball = Ball::new(&body, &cameras);
-            let [one, wyman, inside] = METHODS.map(|method| ball.row(method));
+            let [one, wyman, inside] = SecondSurface::ALL.map(|method| ball.row(method));
             assert!(
                 inside.median_deg < 0.05 && inside.most_deg < 0.2,
                 "{ior}: {} {}",
@@ -230,7 +248,7 @@ mod tests {
             assert!(one.median_deg > 2.0 * wyman.median_deg, "{ior}: {} {}", one.median_deg, wyman.median_deg);
             assert!(inside.reflected_ratio < 0.01 && wyman.reflected_ratio > 0.05, "{ior}");
             guesses_deg.push(wyman.median_deg);
-            let by_incidence = ball.by_incidence(INSIDE);
+            let by_incidence = ball.by_incidence(SecondSurface::InsideImages);
             let mut below_grazing = by_incidence.points.iter().filter(|point| point.x <= 85.0);
             assert!(below_grazing.all(|point| point.y < 1.0), "{ior}: {:?}", by_incidence.points);
         }
@@ -245,10 +263,10 @@ mod tests {
         let ball = Ball::new(&body, &cameras);
         let places = [0.0, 0.999, 0.9999, 1.0].map(|beside| Vec2::new(0.0, beside));
         let entries = ball.entries(&places);
-        for method in METHODS {
+        for method in SecondSurface::ALL {
             let emerged = ball.emerged(method, &entries);
-            assert!(emerged.iter().all(|end| end.ray.direction_in_world.is_finite()), "{method}");
-            assert!(emerged.iter().all(|end| end.throughput_linear.is_finite()), "{method}");
+            assert!(emerged.iter().all(|end| end.ray.direction_in_world.is_finite()), "{method:?}");
+            assert!(emerged.iter().all(|end| end.throughput_linear.is_finite()), "{method:?}");
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::failures::stand::Stand;
 use crate::graph::Met;
 
 /// Surfaces nearer than this share of the body's size are the one that a ray begins on.
-pub const NEAR_SHARE: f32 = 0.002;
+const NEAR_SHARE: f32 = 0.002;
 
 /// A closed body of one material.
 pub struct Body {

@@ -3,18 +3,17 @@
 use anyhow::Context as _;
 use depth_image::{PinholeCamera, ToneMapping, View};
 use glam::{UVec2, Vec3};
-use image::RgbImage;
 use metrics::flip_map;
 use rayon::prelude::*;
 use render::scalar;
 use report::{Bar, Check, Picture, PictureRow, Report};
 
-use super::ball::{INSIDE, METHODS, WYMAN, emerged};
+use super::ball::{SecondSurface, emerged};
 use super::body::{Body, Emerged, Entry, of_parts};
 use super::inside::{InsideImages, cameras};
 use crate::failures::stand::Stand;
 use crate::impostors::rays::unit_rays;
-use crate::impostors::surfaces::Surfaces;
+use crate::impostors::surfaces::{SKY_SRGB, Surfaces};
 use crate::statistics::mean_of;
 use crate::study::{Column, measure_rows, table};
 
@@ -29,18 +28,17 @@ const UP_M: f32 = 0.5;
 const FOV_DEG: f32 = 46.0;
 const FAR_M: f32 = 1e3;
 const NEAR_M: f32 = 1e-3;
-const SKY_SRGB: [u8; 3] = [168, 196, 224];
 
 /// FLIP of one body, over the pixels that show it.
 struct BodyRow {
     body: &'static str,
-    method: &'static str,
+    method: SecondSurface,
     flip: f64,
 }
 
 const COLUMNS: [Column<BodyRow>; 3] = [
     Column::new("body", |row| row.body.into()),
-    Column::new("the second surface", |row| row.method.into()),
+    Column::new("the second surface", |row| row.method.name().into()),
     Column::new("FLIP over glass", |row| row.flip.into()),
 ];
 
@@ -71,12 +69,12 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
         report.pictures.push(pictures);
     }
     report.tables.push(table("Views of the scene glass, one body at a time", &COLUMNS, &rows)?);
-    let ratio = mean_flip(&rows, INSIDE) / mean_flip(&rows, WYMAN);
+    let ratio = mean_flip(&rows, SecondSurface::InsideImages) / mean_flip(&rows, SecondSurface::Wyman);
     report.checks.push(Check::new("FLIP over glass: inside images over Wyman", ratio, "×", Bar::AtMost(0.8)));
     Ok(())
 }
 
-fn mean_flip(rows: &[BodyRow], method: &str) -> f64 {
+fn mean_flip(rows: &[BodyRow], method: SecondSurface) -> f64 {
     let flips: Vec<f64> = rows.iter().filter(|row| row.method == method).map(|row| row.flip).collect();
     mean_of(&flips, |flip| *flip)
 }
@@ -90,7 +88,7 @@ fn of_body(
     let stage = Stage::new(stand, part)?;
     let cameras = cameras(&stage.body)?;
     let inside = InsideImages::take(&cameras, &stage.body);
-    let mut flips = METHODS.map(|_| Vec::new());
+    let mut flips = SecondSurface::ALL.map(|_| Vec::new());
     let mut pictures = Vec::new();
     for azimuth_rad in AZIMUTHS_RAD {
         let camera = stage.camera(azimuth_rad, size_px);
@@ -99,13 +97,13 @@ fn of_body(
         let truth = stage.truth(&camera, &shown);
         pictures.clear();
         pictures.push(picture(name, "rays", &truth)?);
-        for (method, flips) in METHODS.into_iter().zip(&mut flips) {
+        for (method, flips) in SecondSurface::ALL.into_iter().zip(&mut flips) {
             let view = stage.view(size_px, &shown, |entries| emerged(&stage.body, &inside, method, entries));
             flips.push(flip_map(&truth, &view)?.mean(Some(&is_glass))?.context("pixels of glass")?);
-            pictures.push(picture(name, method, &view)?);
+            pictures.push(picture(name, method.name(), &view)?);
         }
     }
-    let rows = METHODS.into_iter().zip(&flips).map(|(method, flips)| BodyRow {
+    let rows = SecondSurface::ALL.into_iter().zip(&flips).map(|(method, flips)| BodyRow {
         body: name,
         method,
         flip: mean_of(flips, |flip| *flip),
@@ -114,7 +112,7 @@ fn of_body(
 }
 
 fn picture(body: &str, method: &str, view: &View) -> anyhow::Result<Picture> {
-    let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, view.srgb8.clone()).context("a picture")?;
+    let image = pictures::rgb(view).context("a picture")?;
     Ok(Picture::new(format!("{body} by {method}"), method, image))
 }
 
@@ -124,7 +122,7 @@ impl Stage {
         let body = Body::new(stand, &of_parts(&scene, &[part]))?;
         Ok(Self {
             body,
-            room: Surfaces::new(stand, &of_parts(&scene, &[ROOM]))?,
+            room: Surfaces::new(&stand.upload(&of_parts(&scene, &[ROOM]))?)?,
             whole: scalar::rays::Scene::of(&stand.upload(&of_parts(&scene, &[ROOM, part]))?, 0.0)?,
         })
     }

@@ -10,11 +10,11 @@ use super::methods::FINE;
 use super::search::SurfacePoint;
 use super::subject::{Blocks, behind_block, set_cameras, view};
 use crate::graph::{GraphCamera, GraphImage, pinhole};
+use crate::impostors::surfaces::SKY_SRGB;
 
 /// Sizes in full and in quick runs.
 const SIZE_PX: [UVec2; 2] = [UVec2::new(1280, 720), UVec2::new(640, 360)];
 const RAYS: [u32; 2] = [64, 16];
-const SKY_SRGB: [u8; 3] = [168, 196, 224];
 
 /// # Errors
 /// A camera cannot be used.

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_floor_is_not_covered_and_a_point_on_the_eye_is_no_number_that_is_none() {
+    fn an_open_floor_is_not_covered_and_no_point_gives_nan() {
         let camera = camera(Vec3::new(6.0, 3.0, 0.0));
         let image = GraphImage::take(&camera, meet);
         let far = SurfacePoint { point: DVec3::new(7.0, 0.0, 0.0), normal: DVec3::Y };

@@ -77,7 +77,7 @@ impl Blocks {
     /// # Errors
     /// The device fails.
     pub fn new(stand: &Stand) -> anyhow::Result<Self> {
-        Ok(Self(Surfaces::new(stand, &fixtures::hidden_block())?))
+        Ok(Self(Surfaces::new(&stand.upload(&fixtures::hidden_block())?)?))
     }
 
     pub fn image<'c>(&self, camera: &'c GraphCamera) -> GraphImage<'c> {

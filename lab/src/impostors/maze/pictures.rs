@@ -14,11 +14,11 @@ use super::found::SEARCH;
 use super::subject::{NEAR_M, Shown, Subject};
 use crate::failures::stage::in_the_dark;
 use crate::graph::GraphImage;
+use crate::impostors::surfaces::SKY_SRGB;
 
 const VIEW_PX: UVec2 = UVec2::new(400, 300);
 /// Places near the entrance, in the middle and at the end.
 const PLACES: [usize; 3] = [4, 14, 27];
-const SKY_SRGB: [u8; 3] = [168, 196, 224];
 /// Every second texel.
 const TEXELS_PX: u32 = 2;
 

@@ -50,7 +50,7 @@ impl<'s> Subject<'s> {
     pub fn new(stand: &'s Stand, maze: Maze) -> anyhow::Result<Self> {
         let scene = maze.scene(None);
         let on_device = stand.upload(&scene)?;
-        let surfaces = Surfaces::new(stand, &scene)?;
+        let surfaces = Surfaces::new(&on_device)?;
         let teapot = scalar::rays::Scene::of(&stand.upload(&maze_teapot())?, 0.0)?;
         Ok(Self { stand, maze, scene, on_device, surfaces, teapot })
     }

@@ -111,7 +111,7 @@ fn row(name: &str, relief: &Relief<'_>, elevation_deg: f32, rays: &CarRays) -> a
 /// The device fails.
 pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
     let size_px = VIEW_PX[usize::from(is_quick)];
-    let surfaces = Surfaces::new(stand, &car())?;
+    let surfaces = Surfaces::new(&stand.upload(&car())?)?;
     let from_elevations =
         ELEVATIONS_DEG.map(|elevation_deg| (elevation_deg, CarRays::from_elevation(&surfaces, elevation_deg, size_px)));
     let rows = measure_rows("images of a car", IMAGES, |(name, images)| {
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn a_single_pole_shows_the_sides_of_a_car_and_a_pinhole_from_above_does_not() {
         let stand = Stand::new(&GpuEngine::shared(DevicePreference::Software).unwrap(), true);
-        let surfaces = Surfaces::new(&stand, &car()).unwrap();
+        let surfaces = Surfaces::new(&stand.upload(&car()).unwrap()).unwrap();
         let rays = CarRays::from_elevation(&surfaces, BAR_DEG, UVec2::new(64, 48));
         let found = |images| {
             let relief = Relief::take(&stand, &car(), images).unwrap();

@@ -11,14 +11,13 @@ use super::relief::{NEAR_M, Relief, ReliefHit, ReliefImages};
 use super::sun::{SUN, SunMap};
 use crate::failures::stand::Stand;
 use crate::impostors::rays::unit_rays;
-use crate::impostors::surfaces::Surfaces;
+use crate::impostors::surfaces::{SKY_SRGB, Surfaces};
 
 /// What is left of a colour in the shadow.
 const SHADOW: f32 = 0.45;
-/// Shadow rays begin on a surface.
-const SHADOW_NEAR_M: f32 = 0.02;
+/// Shadow rays begin so far from the surface.
+const LIFT_M: f32 = 0.02;
 const FAR_M: f32 = 1e3;
-const SKY_SRGB: [u8; 3] = [168, 196, 224];
 /// From the middle of a park.
 const VIEW_FROM: Vec3 = Vec3::new(0.75, 0.5, 1.05);
 const FOV_RAD: f32 = 0.5;
@@ -99,7 +98,7 @@ impl Park {
     /// The device fails.
     pub fn draw_triangles(&self, stand: &Stand, camera: &PinholeCamera) -> anyhow::Result<ParkPicture> {
         let scene = if self.tints_srgb.is_empty() { barrels(self.count()) } else { car_park(self.count()) };
-        let surfaces = Surfaces::new(stand, &scene)?;
+        let surfaces = Surfaces::new(&stand.upload(&scene)?)?;
         let shown = unit_rays(camera).map(|ray| {
             let met = surfaces.meet(&ray, [NEAR_M, FAR_M])?;
             Some(ShownSurface { at: ray.at(met.t), color_linear: met.color_linear })
@@ -107,8 +106,9 @@ impl Park {
         let shown: Vec<Option<ShownSurface>> = shown.collect();
         let in_shadow = shown.par_iter().map(|shown| {
             shown.is_some_and(|shown| {
-                let towards = Ray { origin_in_world: shown.at, direction_in_world: SUN.normalize_or_zero() };
-                surfaces.meet_any(&towards, [SHADOW_NEAR_M, FAR_M])
+                let direction_in_world = SUN.normalize_or_zero();
+                let origin_in_world = shown.at + direction_in_world * LIFT_M;
+                surfaces.is_blocked(&Ray { origin_in_world, direction_in_world }, FAR_M)
             })
         });
         Ok(drawn(camera.size_px, &shown, in_shadow.collect()))
@@ -121,7 +121,7 @@ impl<'s> ReliefPark<'s> {
     pub fn new(stand: &'s Stand, park: &'s Park, images: ReliefImages) -> anyhow::Result<Self> {
         let relief = Relief::take(stand, &park.object, images)?;
         let placements = Placements::new(&park.places, relief.bounds)?;
-        Ok(Self { park, relief, placements, floor: Surfaces::new(stand, &park_floor(&park.places))? })
+        Ok(Self { park, relief, placements, floor: Surfaces::new(&stand.upload(&park_floor(&park.places))?)? })
     }
 
     /// # Errors
@@ -136,8 +136,8 @@ impl<'s> ReliefPark<'s> {
         let hits = reliefs.hits.iter().flatten().count();
         Ok(ReliefPicture {
             relief_ratio: hits as f64 / rays.len().max(1) as f64,
-            view_s: reliefs.device_s,
-            sun_map_s: sun.device_s,
+            view_s: reliefs.seconds,
+            sun_map_s: sun.seconds,
             drawn: drawn(camera.size_px, &shown, in_shadow.collect()),
         })
     }

@@ -1,9 +1,12 @@
 //! An object as images of it, drawn at many places: each ray is taken to the object's space where it enters a placement's box, and is
 //! followed in the images there (Rosen et al., section 6.2).
 
+use std::time::Instant;
+
 use depth_image::{Aabb, Camera, DepthImage, Environment, PinholeCamera, ProvenanceKind, Ray, SinglePoleCamera};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
+use rayon::prelude::*;
 use reconstruction::{RayEnd, RayWork, SampleSet};
 use render::{Lighting, SamplePlanes};
 use scene::Scene;
@@ -56,10 +59,10 @@ pub struct ReliefHit {
     pub color_linear: Vec3,
 }
 
-/// The ends of rays, and what they took on the device.
+/// The ends of rays, and the time of their search, with that of boxes.
 pub struct ReliefHits {
     pub hits: Vec<Option<ReliefHit>>,
-    pub device_s: f64,
+    pub seconds: f64,
 }
 
 impl ReliefImages {
@@ -119,23 +122,24 @@ impl<'s> Relief<'s> {
     /// # Errors
     /// The device fails.
     pub fn follow(&self, placements: &Placements, rays: &[Ray], near_m: f32) -> anyhow::Result<ReliefHits> {
-        let boxes: Vec<Vec<BoxEntry>> = rays.iter().map(|ray| placements.entries(ray)).collect();
-        let mut found = ReliefHits { hits: vec![None; rays.len()], device_s: 0.0 };
+        let start = Instant::now();
+        let boxes: Vec<Vec<BoxEntry>> = rays.par_iter().map(|ray| placements.entries(ray)).collect();
+        let mut hits: Vec<Option<ReliefHit>> = vec![None; rays.len()];
         for round in 0.. {
             let in_boxes: Vec<RayInBox> = boxes
                 .iter()
                 .enumerate()
                 .filter_map(|(ray, boxes)| Some(RayInBox { ray, entry: *boxes.get(round)? }))
-                .filter(|in_box| found.hits[in_box.ray].is_none_or(|hit: ReliefHit| hit.t > in_box.entry.t))
+                .filter(|in_box| hits[in_box.ray].is_none_or(|hit| hit.t > in_box.entry.t))
                 .collect();
             if in_boxes.is_empty() {
                 break;
             }
             for chunk in in_boxes.chunks(RAYS_AT_ONCE) {
-                self.follow_in_boxes(placements, rays, chunk, near_m, &mut found)?;
+                self.follow_in_boxes(placements, rays, chunk, near_m, &mut hits)?;
             }
         }
-        Ok(found)
+        Ok(ReliefHits { hits, seconds: start.elapsed().as_secs_f64() })
     }
 
     fn follow_in_boxes(
@@ -144,14 +148,13 @@ impl<'s> Relief<'s> {
         rays: &[Ray],
         in_boxes: &[RayInBox],
         near_m: f32,
-        found: &mut ReliefHits,
+        hits: &mut [Option<ReliefHit>],
     ) -> anyhow::Result<()> {
         let in_object: Vec<Ray> = in_boxes.iter().map(|in_box| in_box.in_object(placements, rays)).collect();
-        let (ends, device_s) = self.stand.reconstructor().follow(RayWork::new(&self.set, near_m), &in_object)?;
-        found.device_s += device_s;
+        let (ends, _) = self.stand.reconstructor().follow(RayWork::new(&self.set, near_m), &in_object)?;
         for (in_box, end) in in_boxes.iter().zip(ends) {
             let hit = in_box.hit(placements, &end);
-            let nearest = &mut found.hits[in_box.ray];
+            let nearest = &mut hits[in_box.ray];
             if hit.is_some_and(|hit| nearest.is_none_or(|nearest| nearest.t > hit.t)) {
                 *nearest = hit;
             }

@@ -22,7 +22,7 @@ pub struct SunMap {
     camera: PinholeCamera,
     ways_m: Vec<f32>,
     texel_m: f32,
-    pub device_s: f64,
+    pub seconds: f64,
 }
 
 impl SunMap {
@@ -36,7 +36,7 @@ impl SunMap {
         let found = relief.follow(placements, &rays, NEAR_M)?;
         let ways_m = found.hits.par_iter().map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t));
         let texel_m = 2.0 * reach_m / SIZE_PX.y as f32;
-        Ok(Self { camera, ways_m: ways_m.collect(), texel_m, device_s: found.device_s })
+        Ok(Self { camera, ways_m: ways_m.collect(), texel_m, seconds: found.seconds })
     }
 
     pub fn is_in_shadow(&self, point: Vec3) -> bool {
