@@ -90,7 +90,7 @@ impl CarRays {
 
 fn row(name: &str, relief: &Relief<'_>, elevation_deg: f32, rays: &CarRays) -> anyhow::Result<CoverageRow> {
     let placements = Placements::new(&[Affine3A::IDENTITY], relief.bounds)?;
-    let hits = relief.follow(&placements, &rays.rays, NEAR_M)?.hits;
+    let hits = relief.follow(&placements, &rays.rays, &placements.entries_of(&rays.rays))?;
     let tolerance_m = RIGHT * relief.bounds.size().max_element();
     let ends = hits.iter().zip(&rays.ways_m);
     let errors_m = ends.filter_map(|(hit, way_m)| hit.map(|hit| (hit.t - way_m).abs()));

@@ -129,7 +129,7 @@ impl<'s> ReliefPark<'s> {
     pub fn draw(&self, camera: &PinholeCamera) -> anyhow::Result<ReliefPicture> {
         let sun = SunMap::draw(&self.relief, &self.placements, self.park.reach_m())?;
         let rays: Vec<Ray> = unit_rays(camera).collect();
-        let reliefs = self.relief.follow(&self.placements, &rays, NEAR_M)?;
+        let reliefs = self.relief.draw(&self.placements, camera, &rays)?;
         let shown: Vec<Option<ShownSurface>> =
             rays.par_iter().zip(&reliefs.hits).map(|(ray, hit)| self.shown(ray, hit.as_ref())).collect();
         let in_shadow = shown.par_iter().map(|shown| shown.is_some_and(|shown| sun.is_in_shadow(shown.at)));

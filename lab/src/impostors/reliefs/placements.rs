@@ -1,9 +1,12 @@
 //! The places of a relief: a turn, a uniform scale and a translation each.
 
-use depth_image::{Aabb, Ray};
-use glam::{Affine3A, Vec3};
+use depth_image::{Aabb, PinholeCamera, Ray};
+use glam::{Affine3A, UVec2, Vec2, Vec3};
+use rayon::prelude::*;
 
 pub const MAX_PLACEMENTS: usize = 4096;
+/// The side of a picture's tiles.
+const TILE_PX: u32 = 8;
 /// The greatest difference of a placement's axes from one length and right angles, in shares of its scale.
 const RIGID: f32 = 1e-3;
 /// The least and the greatest scale.
@@ -26,6 +29,7 @@ pub enum PlacementError {
 /// One place of an object.
 #[derive(Debug, Clone, Copy)]
 pub struct Placement {
+    world_from_object: Affine3A,
     pub object_from_world: Affine3A,
     /// Metres of the world for one of the object.
     pub scale: f32,
@@ -39,7 +43,7 @@ pub struct Placements {
 }
 
 /// A ray's way into the box of a placement.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoxEntry {
     pub placement: usize,
     /// The ray's parameter where it enters the box, or begins in it.
@@ -61,17 +65,63 @@ impl Placements {
         &self.all[number]
     }
 
-    /// The boxes that a ray enters, the nearest first.
-    pub fn entries(&self, ray: &Ray) -> Vec<BoxEntry> {
-        let boxes = self.all.iter().enumerate();
-        let mut entries: Vec<BoxEntry> = boxes
-            .filter_map(|(number, placement)| {
-                let t = entry(&self.bounds, &placement.in_object(ray))?;
-                Some(BoxEntry { placement: number, t })
-            })
-            .collect();
+    /// The boxes that each ray enters. Rays are those of a camera's pixels, row by row: each is tested against the boxes that its tile of
+    /// the picture shows.
+    pub fn entries_in_view(&self, camera: &PinholeCamera, rays: &[Ray]) -> Vec<Vec<BoxEntry>> {
+        let columns = camera.size_px.x.div_ceil(TILE_PX);
+        let tiles = self.tiles(camera);
+        let numbered = rays.par_iter().enumerate().map(|(number, ray)| {
+            let tile = UVec2::new(number as u32 % camera.size_px.x, number as u32 / camera.size_px.x) / TILE_PX;
+            self.entries(ray, tiles[(tile.y * columns + tile.x) as usize].iter().copied())
+        });
+        numbered.collect()
+    }
+
+    /// The boxes that each ray enters, of all.
+    pub fn entries_of(&self, rays: &[Ray]) -> Vec<Vec<BoxEntry>> {
+        rays.par_iter().map(|ray| self.entries(ray, 0..self.all.len())).collect()
+    }
+
+    /// Some of the boxes that a ray enters, the nearest first.
+    fn entries(&self, ray: &Ray, numbers: impl Iterator<Item = usize>) -> Vec<BoxEntry> {
+        let entries = numbers.filter_map(|placement| {
+            let t = entry(&self.bounds, &self.all[placement].in_object(ray))?;
+            Some(BoxEntry { placement, t })
+        });
+        let mut entries: Vec<BoxEntry> = entries.collect();
         entries.sort_by(|a, b| a.t.total_cmp(&b.t));
         entries
+    }
+
+    /// The placements whose boxes each tile of a picture shows.
+    fn tiles(&self, camera: &PinholeCamera) -> Vec<Vec<usize>> {
+        let tiles_px = camera.size_px.map(|side_px| side_px.div_ceil(TILE_PX));
+        let mut tiles = vec![Vec::new(); tiles_px.element_product() as usize];
+        for (number, placement) in self.all.iter().enumerate() {
+            let Some([first, last]) = self.shown_in(placement, camera) else { continue };
+            for row in first.y / TILE_PX..=last.y / TILE_PX {
+                for column in first.x / TILE_PX..=last.x / TILE_PX {
+                    tiles[(row * tiles_px.x + column) as usize].push(number);
+                }
+            }
+        }
+        tiles
+    }
+
+    /// The first and last pixel, along both sides, that a placement's box is shown in; all pixels where a part of it is behind the eye.
+    fn shown_in(&self, placement: &Placement, camera: &PinholeCamera) -> Option<[UVec2; 2]> {
+        let last_px = camera.size_px - 1;
+        let mut first = Vec2::INFINITY;
+        let mut last = Vec2::NEG_INFINITY;
+        for corner in self.bounds.corners() {
+            let Some(at) = camera.project(placement.world_from_object.transform_point3(corner)) else {
+                return Some([UVec2::ZERO, last_px]);
+            };
+            first = first.min(at.pixel);
+            last = last.max(at.pixel);
+        }
+        let is_shown = last.cmpge(Vec2::ZERO).all() && first.cmplt(camera.size_px.as_vec2()).all();
+        is_shown.then(|| [first.max(Vec2::ZERO).as_uvec2(), last.as_uvec2().min(last_px)])
     }
 }
 
@@ -102,7 +152,7 @@ fn placement(number: usize, world_from_object: &Affine3A) -> Result<Placement, P
     if !squares.abs_diff_eq(glam::Mat3A::IDENTITY, RIGID) {
         return Err(PlacementError::NotRigid { placement: number });
     }
-    Ok(Placement { object_from_world: world_from_object.inverse(), scale })
+    Ok(Placement { world_from_object: *world_from_object, object_from_world: world_from_object.inverse(), scale })
 }
 
 /// The parameter at which a ray enters a box, if it does not leave the box before it begins.
@@ -125,6 +175,7 @@ mod tests {
     use glam::{Mat3A, Quat, Vec3A};
 
     use super::*;
+    use crate::impostors::rays::unit_rays;
 
     const BOX: Aabb = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
 
@@ -155,13 +206,31 @@ mod tests {
             [0.0, -8.0].map(|z| Affine3A::from_scale_rotation_translation(Vec3::splat(2.0), turned, Vec3::Z * z));
         let placements = Placements::new(&places, BOX).unwrap();
         let ray = Ray { origin_in_world: Vec3::Z * 20.0, direction_in_world: Vec3::NEG_Z };
-        let entries = placements.entries(&ray);
+        let entries = placements.entries_of(&[ray]).remove(0);
         let corner_m = 2.0 * std::f32::consts::SQRT_2;
         assert_eq!(entries.iter().map(|entry| entry.placement).collect::<Vec<_>>(), [0, 1]);
         assert!((entries[0].t - (20.0 - corner_m)).abs() < 1e-3 && (entries[1].t - (28.0 - corner_m)).abs() < 1e-3);
         let inside = Ray { origin_in_world: Vec3::ZERO, direction_in_world: Vec3::X };
-        assert_eq!(placements.entries(&inside)[0].t, 0.0);
+        assert_eq!(placements.entries_of(&[inside])[0][0].t, 0.0);
         let beside = Ray { origin_in_world: Vec3::Y * 2.5, direction_in_world: Vec3::X };
-        assert!(placements.entries(&beside).is_empty());
+        assert!(placements.entries_of(&[beside])[0].is_empty());
+    }
+
+    /// Also of boxes that the picture cuts, and around the eye.
+    #[test]
+    fn tiles_of_a_picture_miss_no_box() {
+        let eye = Vec3::new(3.0, 2.0, 4.0);
+        let places = (0..60).map(|number| {
+            let at = Vec3::new((number % 8) as f32 - 3.5, 0.0, (number / 8) as f32 - 4.0) * 2.0;
+            let turn = Quat::from_rotation_y(0.3 * number as f32);
+            Affine3A::from_scale_rotation_translation(Vec3::splat(0.6), turn, at)
+        });
+        let places: Vec<Affine3A> = places.chain([Affine3A::from_translation(eye)]).collect();
+        let placements = Placements::new(&places, BOX).unwrap();
+        let camera = PinholeCamera::looking_at(eye, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(61, 43));
+        let rays: Vec<Ray> = unit_rays(&camera).collect();
+        let in_view = placements.entries_in_view(&camera, &rays);
+        assert_eq!(in_view, placements.entries_of(&rays));
+        assert!(in_view.iter().map(Vec::len).max() > Some(3));
     }
 }

@@ -6,7 +6,6 @@ use std::time::Instant;
 use depth_image::{Aabb, Camera, DepthImage, Environment, PinholeCamera, ProvenanceKind, Ray, SinglePoleCamera};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
-use rayon::prelude::*;
 use reconstruction::{RayEnd, RayWork, SampleSet};
 use render::{Lighting, SamplePlanes};
 use scene::Scene;
@@ -15,7 +14,7 @@ use super::placements::{BoxEntry, Placements};
 use crate::failures::stage::in_the_dark;
 use crate::failures::stand::Stand;
 
-/// Rays of views meet nothing nearer to their origin.
+/// Rays meet nothing nearer to their origin, or to where they enter a box.
 pub const NEAR_M: f32 = 1e-3;
 /// Texels of all images of an object.
 const TEXELS: f32 = 262_144.0;
@@ -117,13 +116,26 @@ impl<'s> Relief<'s> {
         Ok(Self { stand, set, bounds: Aabb { min: bounds.min - slack, max: bounds.max + slack }, texels })
     }
 
-    /// Follows rays of unit length among the placements. They meet nothing nearer than `near_m`.
+    /// Follows the rays of a camera's pixels, of unit length, among the placements.
     ///
     /// # Errors
     /// The device fails.
-    pub fn follow(&self, placements: &Placements, rays: &[Ray], near_m: f32) -> anyhow::Result<ReliefHits> {
+    pub fn draw(&self, placements: &Placements, camera: &PinholeCamera, rays: &[Ray]) -> anyhow::Result<ReliefHits> {
         let start = Instant::now();
-        let boxes: Vec<Vec<BoxEntry>> = rays.par_iter().map(|ray| placements.entries(ray)).collect();
+        let hits = self.follow(placements, rays, &placements.entries_in_view(camera, rays))?;
+        Ok(ReliefHits { hits, seconds: start.elapsed().as_secs_f64() })
+    }
+
+    /// Follows rays of unit length in the boxes that they enter.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn follow(
+        &self,
+        placements: &Placements,
+        rays: &[Ray],
+        boxes: &[Vec<BoxEntry>],
+    ) -> anyhow::Result<Vec<Option<ReliefHit>>> {
         let mut hits: Vec<Option<ReliefHit>> = vec![None; rays.len()];
         for round in 0.. {
             let in_boxes: Vec<RayInBox> = boxes
@@ -136,10 +148,10 @@ impl<'s> Relief<'s> {
                 break;
             }
             for chunk in in_boxes.chunks(RAYS_AT_ONCE) {
-                self.follow_in_boxes(placements, rays, chunk, near_m, &mut hits)?;
+                self.follow_in_boxes(placements, rays, chunk, &mut hits)?;
             }
         }
-        Ok(ReliefHits { hits, seconds: start.elapsed().as_secs_f64() })
+        Ok(hits)
     }
 
     fn follow_in_boxes(
@@ -147,11 +159,10 @@ impl<'s> Relief<'s> {
         placements: &Placements,
         rays: &[Ray],
         in_boxes: &[RayInBox],
-        near_m: f32,
         hits: &mut [Option<ReliefHit>],
     ) -> anyhow::Result<()> {
         let in_object: Vec<Ray> = in_boxes.iter().map(|in_box| in_box.in_object(placements, rays)).collect();
-        let (ends, _) = self.stand.reconstructor().follow(RayWork::new(&self.set, near_m), &in_object)?;
+        let (ends, _) = self.stand.reconstructor().follow(RayWork::new(&self.set, NEAR_M), &in_object)?;
         for (in_box, end) in in_boxes.iter().zip(ends) {
             let hit = in_box.hit(placements, &end);
             let nearest = &mut hits[in_box.ray];

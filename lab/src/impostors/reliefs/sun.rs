@@ -5,7 +5,7 @@ use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 
 use super::placements::Placements;
-use super::relief::{NEAR_M, Relief};
+use super::relief::Relief;
 use crate::impostors::rays::unit_rays;
 
 /// The way to the sun.
@@ -33,7 +33,7 @@ impl SunMap {
         let fov_y_rad = 2.0 * (1.0 / DISTANCE).asin();
         let camera = PinholeCamera::looking_at(eye, Vec3::ZERO, Vec3::Y, fov_y_rad, SIZE_PX);
         let rays: Vec<Ray> = unit_rays(&camera).collect();
-        let found = relief.follow(placements, &rays, NEAR_M)?;
+        let found = relief.draw(placements, &camera, &rays)?;
         let ways_m = found.hits.par_iter().map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t));
         let texel_m = 2.0 * reach_m / SIZE_PX.y as f32;
         Ok(Self { camera, ways_m: ways_m.collect(), texel_m, seconds: found.seconds })
