@@ -7,10 +7,9 @@
 //! Views: `service` answers clients. A `batch_stream` makes every view that is requested, a `live_stream` the newest, whose
 //! `course` tells which cell comes next. Views wait in `queue`, live ones, long ones and others in lanes of their own; `render`
 //! makes and encodes them batch by batch, and `outbox` sends them. `quota` bounds them all, and `view_times` predicts the
-//! time of each. The `auditor` compares some with directly drawn ones, by an `audit_choice`.
+//! time of each. The `auditor` compares some with directly drawn ones.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod audit_choice;
 mod auditor;
 mod batch;
 mod batch_stream;

@@ -36,7 +36,7 @@ impl CompositorService {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
         let times = Arc::new(ViewTimes::new(node.config.max_view_s));
-        let auditor = Auditor { node: node.clone(), probes, choice: Mutex::default() };
+        let auditor = Auditor { node: node.clone(), probes, schedule: Mutex::default() };
         let renderer = Rendering::new(Arc::new(auditor), times.clone());
         for lane in Lane::ALL {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, CommonCell, DIRECT, Policy, SceneRef, SetContent, Timeline, Workload};
 use codec::EncodedImage;
-use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
+use depth_image::{PinholeCamera, SampleCamera, nearest_set};
 use node::{ByteCache, CellPlan, CommonSet, NodeParts, Operation, Pinned, SharedSet, Turn, WorkClass};
-use node::{beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
+use node::{beyond_timeline, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
@@ -52,8 +52,6 @@ pub(crate) struct ReadySet {
     /// What its images show, whenever it is.
     subject: SetContent,
     cameras: Vec<PinholeCamera>,
-    /// Its images where audits compare views with them; else none.
-    pub(crate) sample_images: Arc<[DepthImage]>,
     /// Its images for other compositors, where they ask this one.
     relay: Option<RelayBuffer>,
 }
@@ -289,8 +287,7 @@ impl Sets {
         let illumination = &plan.workload.illumination;
         let cameras = &*plan.workload.sample_cameras;
         let packed = if relayed { most_image_bytes(illumination, cameras) } else { 0 };
-        let copies = if compares_images(plan) { 2 } else { 1 };
-        copies * most_set_bytes(illumination, cameras) + packed
+        most_set_bytes(illumination, cameras) + packed
     }
 
     fn loading(
@@ -328,10 +325,7 @@ impl Sets {
         let subject = SetContent::of(&still, 0).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
-        let compared = if compares_images(plan) { set.images.depth() } else { &[] };
-        let sample_images: Arc<[DepthImage]> = compared.into();
-        let bytes =
-            set_bytes(&set.images) + depth_images_bytes(compared) + relay.as_ref().map_or(0, RelayBuffer::bytes);
+        let bytes = set_bytes(&set.images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
         let uploading = self.node.on_device(&plan.workload.scene, move |engine| {
@@ -349,12 +343,8 @@ impl Sets {
         let since = Instant::now();
         let cell = plan.cell;
         let scene = plan.workload.scene.clone();
-        Ok((ReadySet { set, scene, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
+        Ok((ReadySet { set, scene, since, content, cell, moment, subject, cameras, relay }, bytes))
     }
-}
-
-fn compares_images(plan: &Assignment) -> bool {
-    plan.audit.is_some_and(|order| order.with_sample_images)
 }
 
 fn content_of(plan: &CellPlan, set_index: u32) -> Result<SetContent, Status> {

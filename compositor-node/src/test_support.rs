@@ -1,6 +1,6 @@
 //! A plan for tests.
 
-use cluster::{Assignment, Policy, SamplePlanes, SceneHash, SceneRef, SetContent, Timeline, Workload};
+use cluster::{Assignment, Policy, SamplePlanes, SceneHash, SceneRef, Timeline, Workload};
 use depth_image::{Aabb, Environment, Illumination};
 use glam::Vec3;
 
@@ -37,10 +37,4 @@ pub(crate) fn assignment() -> Assignment {
         method: None,
         audit: None,
     }
-}
-
-/// The content of a set of one scene time, by its number.
-pub(crate) fn set_content(number: u32) -> SetContent {
-    let timeline = Timeline { start_s: f64::from(number), ..Timeline::still(0.0) };
-    Assignment { workload: Workload { timeline, ..workload() }, ..assignment() }.set_content(0).unwrap()
 }

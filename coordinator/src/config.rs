@@ -1,15 +1,11 @@
 //! The coordinator's configuration, and the scenes that it offers.
 
-use std::sync::Arc;
-
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{CommonCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination, LightFieldCamera, SourceSpace};
 use planner::{Budget, Row};
 use tonic::Status;
-
-use crate::plan_store::PlanStore;
 
 /// The coordinator's configuration.
 #[derive(Debug, Clone)]
@@ -24,10 +20,8 @@ pub struct CoordinatorConfig {
     pub budget: Option<Budget>,
     /// The share of compositors' time that audits of promises may take, from 0 to 0.5.
     pub audit_time_ratio: f64,
-    /// Where measurements for budgets are kept.
-    pub plans: Option<Arc<dyn PlanStore>>,
-    /// A cheaper light in which representations are compared, for a light that is expensive.
-    pub screening_light: fn(&str) -> Option<String>,
+    /// The rows among which budgets choose in a light, the coarsest samples first and direct drawing in that light last.
+    pub rows: fn(&str) -> Vec<Row>,
 }
 
 impl Default for CoordinatorConfig {
@@ -38,8 +32,7 @@ impl Default for CoordinatorConfig {
             max_workloads: 8,
             budget: None,
             audit_time_ratio: 0.01,
-            plans: None,
-            screening_light: |_| None,
+            rows: |_| Vec::new(),
         }
     }
 }
@@ -75,10 +68,6 @@ pub struct SceneOffer {
     pub source_space: SourceSpace,
     /// Defaults of sessions.
     pub settings: OfferSettings,
-    /// The representations among which budgets choose.
-    pub rows: Vec<Row>,
-    /// Every row is sampled by the rig's own cameras.
-    pub keeps_cameras: bool,
     /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
     pub period_s: Option<f64>,
 }

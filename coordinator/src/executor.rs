@@ -12,7 +12,7 @@ use crate::grpc_status::{of_node, within};
 use crate::probe::probe;
 use crate::schedule::{Command, Event, Scheduler};
 use crate::shared::Shared;
-use crate::view_probes::{keep, probe_views, recall, represent};
+use crate::view_probes::probe_views;
 
 /// How long a node may take to load a scene and get ready.
 const READY_WITHIN: Duration = Duration::from_secs(300);
@@ -35,12 +35,7 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
             Command::Readmit { node_name, workload_number } => {
                 tracing::info!(node = node_name, workload_number, "readmitted");
             }
-            Command::Recall { workload_number, key } => spawn(recall(shared.clone(), workload_number, key)),
             Command::ProbeViews(probe) => spawn(probe_views(shared.clone(), *probe)),
-            Command::Keep(kept) => spawn(keep(shared.clone(), *kept)),
-            Command::Represent { workload_number, choice, measurement } => {
-                spawn(represent(shared.clone(), workload_number, choice, *measurement));
-            }
             Command::Promise { sessions, promise } => {
                 tracing::info!(%promise, "promise");
                 for session in sessions {

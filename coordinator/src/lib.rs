@@ -12,7 +12,6 @@ mod measuring;
 mod measuring_queue;
 mod membership;
 mod observers;
-mod plan_store;
 mod probe;
 pub mod schedule;
 mod service;
@@ -25,6 +24,5 @@ mod workload;
 
 pub use config::{CoordinatorConfig, OfferError, OfferedCell, OfferedCube, SceneOffer, SceneOffers};
 pub use observers::{CoordinatorMetrics, EventLog, Observers};
-pub use plan_store::PlanStore;
 pub use service::serve;
-pub use workload::fitting_size_px;
+pub use session_budget::plan_for_session;

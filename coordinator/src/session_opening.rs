@@ -7,11 +7,14 @@ use depth_image::{SampleCamera, ToneMapping, ViewPlanes};
 use tonic::Status;
 
 use crate::measuring::{known, known_or_measured, send_progress};
-use crate::schedule::{Budgeted, Event, MEASURED_BATCH, Opening, PolicyOverride};
+use crate::schedule::{Budgeted, Event, Opening, PolicyOverride};
 use crate::session_budget::budgeted;
 use crate::sessions::EventSender;
 use crate::shared::Shared;
 use crate::workload::{FULL_LIGHT_DENSITY, chooses_light_density, light_density_for_set, workload_of};
+
+/// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not take minutes.
+const MEASURED_BATCH: u32 = 32;
 
 /// Measures the costs of a session, and hands it to the schedule; its plans come through `events`, as do refusals.
 pub(crate) async fn open(shared: Arc<Shared>, session: u64, request: SessionRequest, events: EventSender) {

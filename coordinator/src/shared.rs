@@ -25,8 +25,6 @@ pub(crate) struct Shared {
     /// Costs are measured one session at a time.
     pub(crate) measuring: Arc<tokio::sync::Mutex<()>>,
     pub(crate) costs: CostTable,
-    /// Measurements for budgets are read and written one after the other.
-    pub(crate) keeping: tokio::sync::Mutex<()>,
     pub(crate) commands: CommandQueue,
     pub(crate) membership: MembershipRegistry,
     pub(crate) sessions: SessionRegistry,
@@ -46,7 +44,6 @@ impl Shared {
             connections: Connections::default(),
             measuring: Arc::default(),
             costs: CostTable::default(),
-            keeping: tokio::sync::Mutex::default(),
             commands: CommandQueue::default(),
             membership: MembershipRegistry::default(),
             sessions: SessionRegistry::default(),

@@ -220,13 +220,14 @@ pub(crate) fn chooses_light_density(request: &SessionRequest, offer: &SceneOffer
     request.takes_light && has_fitted_size(request, offer)
 }
 
-/// The size of offered images that makes them about `SAMPLE_DENSITY` times as dense as a view. Sizes are whole steps of √2
-/// apart, so that sessions of similar views share their samples. `None` without images or with a degenerate view.
-#[must_use]
-pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
-    size_of_density(rig, view, SAMPLE_DENSITY, MAX_FITTING_TEXELS)
+/// The size of offered images that makes them as dense as a view, for samples of light. `None` without images or with a
+/// degenerate view.
+pub(crate) fn light_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
+    size_of_density(rig, view, FULL_LIGHT_DENSITY, MAX_LIGHT_TEXELS)
 }
 
+/// The size of offered images that makes them about `density` times as dense as a view. Sizes are whole steps of √2 apart, so
+/// that sessions of similar views share their samples. `None` without images or with a degenerate view.
 fn size_of_density(rig: &[Camera], view: &PinholeCamera, density: f32, most_texels: usize) -> Option<UVec2> {
     let offered = rig.first()?.reference();
     let wanted = density * view.focal_px.min_element() / offered.focal_px.min_element();
@@ -248,7 +249,10 @@ mod tests {
     #[test]
     fn images_follow_the_density_of_views_in_steps_up_to_a_bound() {
         let rig = vec![Camera::Pinhole(camera(400, 300)); 4];
-        let size = |width, height| fitting_size_px(&rig, &camera(width, height)).map(|size| (size.x, size.y));
+        let size = |width, height| {
+            size_of_density(&rig, &camera(width, height), SAMPLE_DENSITY, MAX_FITTING_TEXELS)
+                .map(|size| (size.x, size.y))
+        };
         assert_eq!(size(200, 150), Some((400, 300)));
         assert_eq!(size(210, 160), Some((400, 300)), "similar views share their samples");
         assert_eq!(size(120, 90), Some((283, 212)));
@@ -258,10 +262,11 @@ mod tests {
         }
         let texels = |cameras: usize| {
             let rig = vec![Camera::Pinhole(camera(400, 300)); cameras];
-            fitting_size_px(&rig, &camera(4000, 3000)).map(|size| size.element_product() as usize * cameras)
+            size_of_density(&rig, &camera(4000, 3000), SAMPLE_DENSITY, MAX_FITTING_TEXELS)
+                .map(|size| size.element_product() as usize * cameras)
         };
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
-        assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
+        assert_eq!(light_size_px(&[], &camera(4, 3)), None);
         assert_eq!(size_of_density(&rig, &camera(400, 300), 1.0, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
         assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(light_density_for_set), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
         assert_eq!(size_of_density(&rig, &camera(800, 600), 0.5, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));

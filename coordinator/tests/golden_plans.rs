@@ -145,11 +145,9 @@ impl Script {
                 }
                 Command::Probe(_) => (),
                 Command::Quarantine { .. } | Command::Readmit { .. } => panic!("no node is at fault"),
-                Command::Recall { .. }
-                | Command::ProbeViews(_)
-                | Command::Keep(_)
-                | Command::Represent { .. }
-                | Command::Promise { .. } => panic!("no session has a budget"),
+                Command::ProbeViews(_) | Command::Promise { .. } => {
+                    panic!("no session has a budget")
+                }
             }
         }
     }

@@ -4,12 +4,13 @@ use app_core::exit::Outcome;
 use clap::Subcommand;
 
 use crate::bench::{self, BenchArgs};
+use crate::budgets::command::{self as planner, PlannerArgs};
 use crate::compare::command::{self as compare, CompareArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
-use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::impostors::command as impostors;
 use crate::lages::{self, LagesArgs};
 use crate::layered::command as layered;
+use crate::lit::fronts_command::{self as fronts, FrontsArgs};
 use crate::lit::light_cache::{self, LightCacheArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 use crate::scene_file::{self, SceneFileArgs};
@@ -44,12 +45,10 @@ pub enum StudyCommand {
     ///
     /// Errors of pictures are those of the foreground: of the pixels that show a surface.
     Failures(FailuresArgs),
-    /// Charts cost against error of every representation among which a budget chooses, and of shared light
+    /// Charts cost against error of shared and of direct light
     ///
-    /// A row of the ladder is a sampling method, a number of sample cameras, a size of their images and a reconstruction
-    /// method. For each subject the report has a table of all rows, charts with the front of the best, direct drawing and
-    /// what `myriorama plan` chooses. Under expensive light the rows are qualities of light_cache with sample sets of several
-    /// sizes, joint_carve, and direct drawing with 1 to 64 rays. docs/fronts.md explains how to read both.
+    /// The rows are qualities of light_cache with sample sets of several sizes, joint_carve, and direct drawing with 1 to 64
+    /// rays, under expensive light. docs/fronts.md explains how to read the charts.
     Fronts(FrontsArgs),
     /// Measures how well images of a mirror's surroundings answer its rays
     ///
@@ -79,7 +78,13 @@ pub enum StudyCommand {
     Shadows(RunArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
-    /// Compares two reports of `study fronts`
+    /// Compares the plans of budgets with tables of all rows
+    ///
+    /// For each scene the report has cost and error of every row among which a budget chooses, on views that no plan sees, and plans
+    /// for budgets that the seed draws: the price of each choice over that of the cheapest row that keeps the budget, and whether
+    /// the budget is kept. docs/planner.md has figures.
+    Planner(PlannerArgs),
+    /// Compares two reports of `study planner`
     Compare(CompareArgs),
 }
 
@@ -109,6 +114,7 @@ impl StudyCommand {
             Self::Shadows(args) => shadows::run(args),
             Self::LightCache(args) => light_cache::run(args),
             Self::Stability(args) => stability::run(args),
+            Self::Planner(args) => planner::run(args),
             Self::Compare(args) => compare::run(args),
         }
     }

@@ -8,13 +8,13 @@
 
 mod balance;
 mod bench;
+mod budgets;
 mod command;
 mod compare;
 mod cpu_share;
 mod delivery;
 mod evaluation;
 mod failures;
-mod fronts;
 mod graph;
 mod impostors;
 mod lages;

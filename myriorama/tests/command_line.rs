@@ -35,13 +35,18 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let cameras = cameras.to_str().unwrap();
     let folder = folder.path().to_str().unwrap();
     let many = vec!["flip 0.1"; 200].join(", ");
-    let cases: [(&[&str], &str); 24] = [
+    let cases: [(&[&str], &str); 26] = [
         (&["plan", "--scene", "courtyard"], "--budget"),
         (&["plan", "--scene", "courtyard", "--budget", "blur 3"], "blur"),
         (&["plan", "--scene", "courtyard", "--budget", "flip NaN"], "flip NaN"),
         (&["plan", "--scene", "courtyard", "--budget", "flip 0"], "above 0"),
-        (&["plan", "--scene", "courtyard", "--budget", &many], "at most one error term"),
-        (&["plan", "--scene", "courtyard", "--budget", "flip 0.1", "--rate", "0"], "0.01 to 1000"),
+        (&["plan", "--scene", "courtyard", "--budget", &many], "two limits"),
+        (
+            &["plan", "--scene", "courtyard", "--budget", "flip 0.1", "--method", "mesh"],
+            "none can be kept with --method",
+        ),
+        (&["view", "--budget", "flip 0.1", "--method", "mesh"], "cannot be used with"),
+        (&["plan", "--scene", "courtyard", "--budget", "flip 0.1", "--views", "0"], "--views"),
         (&["plan", "--scene", broken, "--budget", "flip 0.1"], "broken.glb"),
         (&["up", "--scene", broken], "broken.glb"),
         (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
@@ -132,7 +137,7 @@ fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
         (&["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--sample-size", "40x30"], "--sample-size"),
         (
             &["plan", "--scene", "courtyard", "--sampling", "layered_cube:64", "--budget", "flip 0.1"],
-            "needs depth images",
+            "none can be kept with a layered cube",
         ),
         (
             &["up", "--scene", "courtyard", "--sampling", "layered_cube:64+light_field:100"],
@@ -145,15 +150,15 @@ fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
         (&["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--method", "layered:0"], "in a light field"),
         (
             &["up", "--scene", "courtyard", "--base", "layered_cube:64", "--budget", "flip 0.1"],
-            "--budget flip 0.1: none can be kept with --base layered_cube:64",
+            "--budget flip 0.1: none can be kept with --base",
         ),
         (
             &["coordinator", "--scene", "courtyard", "--base", "layered_cube:64", "--budget", "flip 0.1"],
-            "--budget flip 0.1: none can be kept with --base layered_cube:64",
+            "--budget flip 0.1: none can be kept with --base",
         ),
         (
             &["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--budget", "flip 0.1"],
-            "--budget flip 0.1: none can be kept with --sampling layered_cube:64",
+            "--budget flip 0.1: none can be kept with a layered cube",
         ),
         (&["up", "--scene", "courtyard", "--base", fields], "--base layered_cube:64+light_field:66: a light field"),
     ];

@@ -68,10 +68,7 @@ impl Coordinator {
                 Command::Apply { plan, .. } => self.apply(*plan),
                 Command::Refuse { .. } => self.is_refused = true,
                 // Sessions here have no budget, and nodes no faults.
-                Command::Recall { .. }
-                | Command::ProbeViews(_)
-                | Command::Keep(_)
-                | Command::Represent { .. }
+                Command::ProbeViews(_)
                 | Command::Promise { .. }
                 | Command::Probe(_)
                 | Command::Quarantine { .. }

@@ -69,13 +69,15 @@ pub struct Pace {
     pub image: Duration,
     /// Time of one reconstructed view.
     pub view: Duration,
+    /// Time of one directly drawn view.
+    pub direct: Duration,
 }
 
 impl Pace {
     /// Times in milliseconds.
     #[must_use]
     pub fn from_ms(image_ms: u64, view_ms: u64) -> Self {
-        Self { image: Duration::from_millis(image_ms), view: Duration::from_millis(view_ms) }
+        Self { image: Duration::from_millis(image_ms), view: Duration::from_millis(view_ms), ..Self::default() }
     }
 }
 
@@ -557,6 +559,7 @@ impl Engine for ScalarEngine {
     fn draw_direct(&self, work: &DirectWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.loaded(&work.scene_hash)?;
         known("lighting", &work.lighting, "unlit")?;
+        sleep(self.pace().direct * work.cameras.len() as u32);
         Ok(work
             .cameras
             .iter()

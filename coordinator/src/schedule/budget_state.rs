@@ -1,114 +1,140 @@
-//! A workload's budget: the last plan for it, and the choice in force.
+//! A workload's budget: its plan, the choice in force, and what audits have found.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use planner::{Budget, PromiseState};
+use cluster::{AuditReport, Costs, SamplePlanes};
+use planner::{Demand, Probe, ProbeId, Probed, TestedError};
 
 use super::budget_plan::BudgetPlan;
-use super::chosen::Chosen;
-use super::findings::{Broken, Findings};
-use super::prices::EqualNodes;
 use super::promise_audit::PromiseAudit;
+use super::representation::Representation;
+use super::workload_state::WorkloadState;
+
+/// A still set serves a viewer for this time, as far as costs are concerned.
+pub const STILL_SET_S: f64 = 60.0;
+/// A measurement is asked for again after this pause, and fails after this number of lost nodes.
+const PAUSE: Duration = Duration::from_secs(1);
+const MOST_LOST: u32 = 5;
 
 /// The state of a workload's budget.
 #[derive(Debug, Clone)]
 pub(super) struct BudgetState {
     pub(super) plan: BudgetPlan,
-    pub(super) in_force: Option<InForce>,
-    /// A row whose costs are measured before it is in force.
-    pub(super) switching: Option<Chosen>,
-    /// The choice could not be put in force, for a reason that may pass.
-    pub(super) is_to_be_tried_again: bool,
-    pub(super) findings: Findings,
-    /// Budgets that plans have found to be kept by nothing.
-    unreachable: Vec<Unreachable>,
+    /// Planes of sample images that the rows need, as measured.
+    planes: BTreeMap<usize, SamplePlanes>,
+    not_before: Duration,
+    lost: u32,
+    pub(super) choice: Option<Choice>,
+    /// The promise that audits have found to be broken, until another row is in force.
+    pub(super) broken: Option<Broken>,
 }
 
-/// A budget that nothing keeps.
+/// The row that the plan chose, or one that replaced it when its promise was broken.
 #[derive(Debug, Clone)]
-pub(super) struct Unreachable {
-    pub(super) budget: Budget,
-    pub(super) since: Duration,
-    /// The prices of the plan that found it.
-    pub(super) prices: EqualNodes,
-    /// Another plan would find the same.
-    pub(super) is_final: bool,
+pub(super) struct Choice {
+    /// The place of the row; `None` where nothing keeps the budget.
+    pub(super) row: Option<usize>,
+    pub(super) tested: Option<TestedError>,
     pub(super) reason: String,
-}
-
-/// A choice in force.
-#[derive(Debug, Clone)]
-pub(super) struct InForce {
-    pub(super) chosen: Chosen,
-    pub(super) since: Duration,
     /// The first plan with it, and whether nodes and sessions have that plan.
     pub(super) plan_epoch: u64,
     pub(super) is_applied: bool,
-    /// The audits of its views, where it has a certificate.
+    /// The audits of its views, where it has an error.
     pub(super) audit: Option<PromiseAudit>,
 }
 
+/// The finding of audits, in words.
+#[derive(Debug, Clone)]
+pub(super) struct Broken {
+    pub(super) since: Duration,
+    pub(super) reason: String,
+}
+
 impl BudgetState {
-    /// With another plan than before. A choice of that plan that is not in force yet is given up.
-    pub(super) fn begin(plan: BudgetPlan, before: Option<Self>) -> Self {
-        let Some(Self { plan: last, in_force, switching, mut findings, mut unreachable, .. }) = before else {
-            let (in_force, switching, findings, unreachable) = Default::default();
-            return Self { plan, in_force, switching, is_to_be_tried_again: false, findings, unreachable };
-        };
-        let switching = switching.filter(|chosen| chosen.number != last.number);
-        findings.is_to_be_planned = false;
-        unreachable.retain(|known| !plan.budget.implies(&known.budget));
-        Self { plan, in_force, switching, is_to_be_tried_again: false, findings, unreachable }
+    pub(super) fn new(plan: BudgetPlan) -> Self {
+        Self { plan, planes: BTreeMap::new(), not_before: Duration::ZERO, lost: 0, choice: None, broken: None }
     }
 
-    /// Nothing keeps a budget. What is known of stricter ones says no more.
-    pub(super) fn note_unreachable(&mut self, known: Unreachable) {
-        self.unreachable.retain(|other| !other.budget.implies(&known.budget));
-        self.unreachable.push(known);
+    /// The measurement that is due.
+    pub(super) fn due_probe(&mut self, now: Duration) -> Option<Probe> {
+        let is_due = now >= self.not_before;
+        self.plan.planner.next_probe().filter(|_| is_due)
     }
 
-    /// The knowledge that nothing keeps a budget.
-    pub(super) fn unreachable_by(&self, budget: &Budget) -> Option<&Unreachable> {
-        self.unreachable.iter().find(|known| budget.implies(&known.budget))
+    /// A node has measured views. The row of an impossible answer has failed.
+    pub(super) fn measured(&mut self, probed: &Probed, planes: SamplePlanes) {
+        let asked = self.plan.planner.next_probe().filter(|probe| probe.id == probed.id);
+        self.planes.extend(asked.map(|probe| (probe.row, planes)));
+        let _ = self.plan.planner.answer(probed);
     }
 
-    /// Whether the choice in force keeps a budget, as far as plans and audits know.
-    pub(super) fn keeps(&self, budget: &Budget) -> bool {
-        let Some(InForce { chosen, .. }) = &self.in_force else { return false };
-        let is_promised = chosen.outcome.state == PromiseState::Kept && chosen.budget.implies(budget);
-        let is_broken = self.broken().is_some_and(|broken| broken.is_of(budget));
-        is_promised && !is_broken && self.unreachable_by(&chosen.budget).is_none()
+    /// A node was lost while it measured. The row fails where that happens again and again.
+    pub(super) fn lose(&mut self, now: Duration, id: ProbeId) {
+        self.lost += 1;
+        self.not_before = now + PAUSE;
+        if self.lost >= MOST_LOST {
+            self.lost = 0;
+            self.plan.planner.fail(id);
+        }
     }
 
-    /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.
-    pub(super) fn is_superseded(&self) -> bool {
-        self.findings.is_given_up || self.findings.breaks.last().is_some_and(|at| self.plan.began < *at)
+    /// The choice of the plan, once that is made.
+    pub(super) fn chosen(&self) -> Option<Choice> {
+        let outcome = self.plan.planner.outcome()?;
+        Some(self.choice_of(outcome.kept.first().copied(), outcome.reason.clone()))
     }
 
-    /// The choice in force, chosen again. Its audits go on, unless its promise is broken or another.
-    pub(super) fn again(&mut self, now: Duration, chosen: Chosen) -> InForce {
-        let is_broken = self.broken().is_some();
-        let again = InForce::begin(now, chosen);
-        let Some(before) = self.in_force.take() else { return again };
-        let is_same = before.chosen.row == again.chosen.row && before.chosen.budget == again.chosen.budget;
-        let audit = if is_same && !is_broken && again.audit.is_some() { before.audit } else { again.audit };
-        InForce { plan_epoch: before.plan_epoch, audit, chosen: again.chosen, since: again.since, is_applied: true }
+    /// The choice in place of one whose promise is broken: the cheapest row that was tested to be more accurate, else drawing
+    /// directly.
+    pub(super) fn safer(&self, reason: &str) -> Option<Choice> {
+        let broken = self.choice.as_ref()?.tested?;
+        let mut kept = self.plan.planner.outcome()?.kept.iter().copied();
+        let row = kept.find(|&row| self.tested(row).is_none_or(|tested| tested.mean_ratio < broken.mean_ratio))?;
+        Some(self.choice_of(Some(row), format!("{} took its place. {reason}", self.plan.row(row)?)))
     }
 
-    /// The broken promise, until another choice is in force and applied.
-    pub(super) fn broken(&self) -> Option<&Broken> {
-        self.findings.broken.as_ref().filter(|broken| {
-            let other = self.in_force.as_ref().filter(|in_force| in_force.chosen.number != broken.choice_number);
-            other.is_none_or(|in_force| !in_force.is_applied)
-        })
+    fn choice_of(&self, row: Option<usize>, reason: String) -> Choice {
+        let tested = row.and_then(|row| self.tested(row));
+        let audit = tested.map(|tested| PromiseAudit::new(self.plan.budgeted.budget, &tested));
+        Choice { row, tested, reason, plan_epoch: 0, is_applied: true, audit }
+    }
+
+    /// The test of a row; `None` for drawing directly with all rays, which has no error.
+    fn tested(&self, row: usize) -> Option<TestedError> {
+        let is_exact = self.plan.planner.request().exact == Some(row);
+        self.plan.planner.summary(row).and_then(|summary| summary.tested).filter(|_| !is_exact)
+    }
+
+    /// A row as it is put in force; `asked` are the costs of what sessions ask for.
+    pub(super) fn representation(&self, row: usize, asked: &Costs) -> Option<Representation> {
+        let costs = self.plan.planner.costs(row)?;
+        let planes = self.planes.get(&row).copied().unwrap_or_default();
+        Some(Representation::new(self.plan.row(row)?.clone(), &costs, planes, asked))
+    }
+
+    /// Takes note of audited views; the finding where they break the promise.
+    pub(super) fn audited(&mut self, now: Duration, report: &AuditReport) -> Option<String> {
+        let Choice { row, plan_epoch, audit, .. } = self.choice.as_mut()?;
+        let audit = audit.as_mut()?;
+        if !audit.take(*plan_epoch, report) || self.broken.is_some() {
+            return None;
+        }
+        let name = row.and_then(|row| self.plan.row(row)).map(ToString::to_string).unwrap_or_default();
+        let reason = format!("Audits found {} with {name}.", audit.finding());
+        self.broken = Some(Broken { since: now, reason: reason.clone() });
+        Some(reason)
     }
 }
 
-impl InForce {
-    /// A choice that is in force from now on.
-    pub(super) fn begin(now: Duration, chosen: Chosen) -> Self {
-        let certificate = chosen.outcome.certificate.as_ref().filter(|_| chosen.row.is_some());
-        let audit = chosen.budget.error().zip(certificate).map(|(term, of)| PromiseAudit::begin(now, term, of));
-        Self { chosen, since: now, plan_epoch: 0, is_applied: true, audit }
+/// The work that a workload's views are part of.
+pub(super) fn demand(workload: &WorkloadState) -> Demand {
+    let shown = (workload.sessions.views_per_s() * STILL_SET_S) as usize;
+    let is_still = !workload.requested.timeline.moves();
+    let views_a_set = if is_still { workload.sessions.views_at_once() + shown } else { workload.load().views };
+    Demand {
+        nodes: workload.nodes.len().max(1),
+        cells: workload.requested.view_cell_count().max(1),
+        views_a_set: views_a_set.max(1),
     }
 }

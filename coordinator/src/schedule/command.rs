@@ -6,9 +6,8 @@ use std::time::Duration;
 use cluster::{FetchImages, MeasureCosts, NodeStatus, Promise, SessionPlan};
 use depth_image::SampleCamera;
 
-use planner::{Kept, KeptKey};
+use planner::ProbeId;
 
-pub use super::budget_plan::ViewProbe;
 use super::{ChoiceError, ProbeKind};
 
 /// A command to the executor.
@@ -24,20 +23,24 @@ pub enum Command {
     Quarantine { node_name: String, workload_number: Option<u64>, reason: String },
     /// The node may get such roles again.
     Readmit { node_name: String, workload_number: Option<u64> },
-    /// Find the measurements of earlier plans, and answer with [`Event::Planned`](super::Event::Planned).
-    Recall { workload_number: u64, key: KeptKey },
-    /// Have a node measure views, and answer with [`Event::Planned`](super::Event::Planned) or
-    /// [`Event::ProbeLost`](super::Event::ProbeLost).
+    /// Have a node measure views, and answer with [`Event::ViewsProbed`](super::Event::ViewsProbed) or
+    /// [`Event::ProbeFailed`](super::Event::ProbeFailed).
     ProbeViews(Box<ViewProbe>),
-    /// Keep what was measured, for later plans.
-    Keep(Box<Kept>),
-    /// Have the costs of a chosen representation measured, and answer with
-    /// [`Event::Represented`](super::Event::Represented) or [`Event::Unrepresented`](super::Event::Unrepresented).
-    Represent { workload_number: u64, choice: u64, measurement: Box<MeasureCosts> },
     /// Tell the sessions what is promised to them.
     Promise { sessions: Vec<u64>, promise: Box<Promise> },
     /// No plan can be made for the session.
     Refuse { session: u64, error: ChoiceError },
+}
+
+/// A measurement that one node is asked for.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct ViewProbe {
+    pub workload_number: u64,
+    pub id: ProbeId,
+    pub node_name: String,
+    pub address: String,
+    pub request: MeasureCosts,
 }
 
 /// A question that the coordinator asks a node itself.
@@ -82,12 +85,7 @@ impl fmt::Display for Command {
             Self::Readmit { node_name, workload_number } => {
                 write!(f, "readmit {node_name}{}", of_workload(*workload_number))
             }
-            Self::Recall { workload_number, .. } => write!(f, "recall measurements for workload {workload_number}"),
             Self::ProbeViews(probe) => write_view_probe(f, probe),
-            Self::Keep(kept) => write!(f, "keep measurements of {} rows", kept.rows.len()),
-            Self::Represent { workload_number, measurement, .. } => {
-                write!(f, "measure the costs of {} for workload {workload_number}", measurement.method)
-            }
             Self::Promise { sessions, promise } => write!(f, "tell sessions {sessions:?}: {promise}"),
             Self::Refuse { session, error } => write!(f, "refuse session {session}: {error}"),
         }
@@ -95,10 +93,9 @@ impl fmt::Display for Command {
 }
 
 fn write_view_probe(f: &mut fmt::Formatter<'_>, probe: &ViewProbe) -> fmt::Result {
-    let ViewProbe { workload_number, id, node_name, views, requests, .. } = probe;
-    let rows = joined(requests.iter().map(|(row, _)| row), ",");
-    let work = if views.is_empty() { "time" } else { "compare" };
-    write!(f, "{node_name} is to {work} rows {rows} for workload {workload_number}, measurement {}", id.number)
+    let ViewProbe { workload_number, id, node_name, request, .. } = probe;
+    let method = &request.method;
+    write!(f, "{node_name} is to compare {method} for workload {workload_number}, measurement {}", id.number)
 }
 
 fn joined<T: ToString>(values: impl IntoIterator<Item = T>, separator: &str) -> String {

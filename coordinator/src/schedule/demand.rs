@@ -20,11 +20,6 @@ pub struct PolicyOverride {
 }
 
 impl PolicyOverride {
-    /// Whether views may be drawn directly.
-    pub(super) fn may_draw_directly(self) -> bool {
-        matches!(self.policy, PolicyChoice::Auto | PolicyChoice::Direct)
-    }
-
     /// # Errors
     /// For a number of tiles that no image may have.
     pub(super) fn validate(&self) -> Result<(), InvalidField> {

@@ -46,15 +46,10 @@ pub enum Event {
     Reported(SamplerReport),
     /// The answer to a [`Probe`](super::Probe); `failure` is `None` where the node passed.
     Probed { plan_epoch: u64, node_name: String, incarnation: u64, kind: ProbeKind, failure: Option<String> },
-    /// An event of the planning for a workload's budget: measurements of earlier plans, or the answer to
-    /// [`Command::ProbeViews`](super::Command::ProbeViews).
-    Planned { workload_number: u64, event: Box<planner::Event> },
-    /// Nodes could not be asked to measure what a planner wants; they are asked again.
-    ProbeLost { workload_number: u64, id: ProbeId, reason: String },
-    /// The costs of a chosen representation are known.
-    Represented { workload_number: u64, choice: u64, costs: Costs, planes: SamplePlanes },
-    /// They cannot be measured.
-    Unrepresented { workload_number: u64, choice: u64, reason: String },
+    /// The answer to [`Command::ProbeViews`](super::Command::ProbeViews).
+    ViewsProbed { workload_number: u64, probed: Box<planner::Probed>, planes: SamplePlanes },
+    /// A node has not measured views; where it was lost, another is asked.
+    ProbeFailed { workload_number: u64, id: ProbeId, is_lost: bool },
     /// A client left, or its session failed.
     Closed { session: u64 },
     /// Only time has passed.
@@ -143,12 +138,14 @@ impl Event {
             | Self::Unready { node_name, .. }
             | Self::Probed { node_name, .. } => nonempty(node_name, "node_name"),
             Self::Reported(report) => report.validate(),
-            Self::Planned { event, .. } => {
-                event.validate().map_err(|error| InvalidField::out_of_range("event", error, "an answer to a planner"))
+            Self::ViewsProbed { probed, .. } => {
+                probed.validate().map_err(|error| InvalidField::out_of_range(error.field, error.value, error.allowed))
             }
-            Self::ProbeLost { reason: why, .. } | Self::Unrepresented { reason: why, .. } => reason(why, "reason"),
-            Self::Represented { costs, .. } => costs.validate(),
-            Self::Limits { .. } | Self::Applied { .. } | Self::Closed { .. } | Self::Tick => Ok(()),
+            Self::Limits { .. }
+            | Self::ProbeFailed { .. }
+            | Self::Applied { .. }
+            | Self::Closed { .. }
+            | Self::Tick => Ok(()),
         }
     }
 }

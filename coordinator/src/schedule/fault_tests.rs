@@ -93,12 +93,7 @@ impl Faults {
                     assert!(self.quarantined.insert(node_name));
                 }
                 Command::Readmit { node_name, .. } => assert!(self.quarantined.remove(&node_name), "{node_name}"),
-                Command::Recall { .. }
-                | Command::ProbeViews(_)
-                | Command::Keep(_)
-                | Command::Represent { .. }
-                | Command::Promise { .. }
-                | Command::Refuse { .. } => panic!("{command}"),
+                Command::ProbeViews(_) | Command::Promise { .. } | Command::Refuse { .. } => panic!("{command}"),
             }
         }
     }

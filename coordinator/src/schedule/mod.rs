@@ -12,13 +12,11 @@ mod budget_state;
 mod budgeted;
 mod cells;
 mod choose;
-mod chosen;
 mod command;
 mod demand;
 mod estimate;
 mod event;
 mod event_log;
-mod findings;
 mod hysteresis;
 mod load;
 mod makespan;
@@ -28,7 +26,6 @@ mod node_shares;
 mod operations;
 mod overload;
 mod prediction;
-mod prices;
 mod promise_audit;
 mod reason;
 mod relay_tree;
@@ -40,10 +37,6 @@ mod session_mix;
 mod smoothing;
 mod workload_state;
 
-#[cfg(test)]
-mod audit_tests;
-#[cfg(test)]
-mod budget_cluster_tests;
 #[cfg(test)]
 mod budget_tests;
 #[cfg(test)]
@@ -58,7 +51,8 @@ mod workloads_tests;
 pub(crate) use test_support::workload as workload_for_tests;
 
 pub use balance::k_fd;
-pub(crate) use budget_plan::MEASURED_BATCH;
+pub use budget_plan::BudgetPlan;
+pub use budget_state::STILL_SET_S;
 pub use budgeted::Budgeted;
 pub use choose::choose;
 pub use cluster::MeasuredCosts;
@@ -69,6 +63,5 @@ pub use event_log::{LogError, Recorder, Step, replay};
 pub use load::Load;
 pub use node_costs::NodeCosts;
 pub use prediction::pipeline_s;
-pub use prices::{EqualNodes, STILL_SET_S};
 pub use scheduler::Scheduler;
 pub use search::Division;

@@ -1,7 +1,6 @@
 //! The cluster as a state machine: events in, commands out.
 
 mod admission;
-mod audits;
 mod budgets;
 mod faults;
 mod planning;
@@ -41,7 +40,6 @@ pub struct Scheduler {
     workloads: BTreeMap<u64, WorkloadState>,
     /// The budget of each workload that has one.
     budgets: BTreeMap<u64, BudgetState>,
-    last_budget_plan: u64,
     /// The measurement that a node makes for a budget, and the time before which no other begins.
     running_probe: Option<ProbeId>,
     probing_paused_until: Duration,
@@ -110,14 +108,10 @@ impl Scheduler {
             Event::Probed { plan_epoch, node_name, incarnation, kind, failure } => {
                 self.probed(plan_epoch, &node_name, incarnation, kind, failure)
             }
-            Event::Planned { workload_number, event } => self.planned(workload_number, *event),
-            Event::ProbeLost { workload_number, id, reason } => self.probe_lost(workload_number, id, reason),
-            Event::Represented { workload_number, choice, costs, planes } => {
-                self.represented(workload_number, choice, costs, planes)
+            Event::ViewsProbed { workload_number, probed, planes } => {
+                self.views_probed(workload_number, &probed, planes)
             }
-            Event::Unrepresented { workload_number, choice, reason } => {
-                self.unrepresented(workload_number, choice, &reason)
-            }
+            Event::ProbeFailed { workload_number, id, is_lost } => self.probe_failed(workload_number, id, is_lost),
             Event::Closed { session } => self.closed(session),
             Event::Tick => self.tick(),
         }

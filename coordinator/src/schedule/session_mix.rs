@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use cluster::{Costs, Quality, SharedLightCosts};
 use depth_image::PinholeCamera;
-use planner::Budget;
 
 use super::operations::operations;
 use super::{Opening, PolicyOverride};
@@ -18,10 +17,6 @@ impl Opening {
     /// Views in the time of a set, at least 1.
     fn weight(&self, set_s: f64) -> f64 {
         self.views_per_s().map_or(self.views_per_set as f64, |rate| rate * set_s).max(1.0)
-    }
-
-    fn budget(&self) -> Option<Budget> {
-        self.budgeted.as_ref().map(|budgeted| budgeted.budget)
     }
 }
 
@@ -118,28 +113,6 @@ impl SessionMix {
     pub(super) fn shared_light(&self) -> Option<SharedLightCosts> {
         let usual_method = self.usual_method()?;
         self.0.iter().find(|session| session.method == usual_method)?.shared_light
-    }
-
-    /// The least strict budget that implies those of all sessions. A session is left out where its budget may not be kept
-    /// together with those before it. Budgets of one workload are comparable.
-    pub(super) fn strictest_budget(&self, may_be_kept: impl Fn(&Budget) -> bool) -> Option<Budget> {
-        let budgets = self.0.iter().filter_map(|session| session.budget());
-        budgets.fold(None, |before: Option<Budget>, budget| {
-            let together = before.map_or(Some(budget), |before| before.and(&budget));
-            together.filter(&may_be_kept).or(before)
-        })
-    }
-
-    /// The sessions of each budget.
-    pub(super) fn budgets(&self) -> Vec<(Budget, Vec<u64>)> {
-        let mut of: Vec<(Budget, Vec<u64>)> = Vec::new();
-        for (budget, number) in self.0.iter().filter_map(|session| Some((session.budget()?, session.session))) {
-            match of.iter_mut().find(|(other, _)| *other == budget) {
-                Some((_, numbers)) => numbers.push(number),
-                None => of.push((budget, vec![number])),
-            }
-        }
-        of
     }
 
     /// The qualities that every session with a rate falls back to, in the same order.

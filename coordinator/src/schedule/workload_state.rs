@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload, is_one_place};
+use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload};
 use depth_image::{PinholeCamera, SampleCamera, ViewCell};
 use glam::UVec2;
+use planner::Row;
 
 use super::active_plan::ActivePlan;
 use super::budgeted::Budgeted;
@@ -36,8 +37,8 @@ pub(super) struct WorkloadState {
     pub(super) sessions: SessionMix,
     /// The choice of budgets, in place of the sessions' own.
     pub(super) representation: Option<Representation>,
-    /// The promises that sessions know, one a budget, and since when.
-    pub(super) announced: Vec<(Duration, Promise)>,
+    /// The promise that sessions know, and since when.
+    pub(super) announced: Option<(Duration, Promise)>,
     /// How views in that representation are audited.
     pub(super) audit: Option<AuditOrder>,
     /// Why no plan can be made for their budget.
@@ -80,7 +81,7 @@ impl WorkloadState {
             first: Arc::new(opening.clone()),
             sessions: SessionMix::default(),
             representation: None,
-            announced: Vec::new(),
+            announced: None,
             audit: None,
             not_planned: None,
             overload: Overload::default(),
@@ -115,8 +116,12 @@ impl WorkloadState {
     }
 
     fn update_costs(&mut self) {
-        let asked = self.sessions.costs(self.set_s());
-        self.costs = asked.map_or(self.costs, |asked| self.represented(asked));
+        self.costs = self.represented(self.asked_costs());
+    }
+
+    /// The costs of what sessions ask for.
+    pub(super) fn asked_costs(&self) -> Costs {
+        self.sessions.costs(self.set_s()).unwrap_or(self.first.costs)
     }
 
     /// Costs of the representation in force, from those of what sessions asked for.
@@ -145,11 +150,11 @@ impl WorkloadState {
         }
     }
 
-    /// The workload in the representation in force.
+    /// The workload in the row in force.
     fn in_representation(&self) -> Workload {
         match (&self.representation, &self.first.budgeted) {
-            (Some(Representation::Row { row, planes, .. }), Some(budgeted)) => {
-                Workload { planes: *planes, ..budgeted.sampled_as(row, &self.requested, &self.planned_cells()) }
+            (Some(Representation { row, planes, .. }), Some(budgeted)) => {
+                Workload { planes: *planes, ..budgeted.in_row(row, &self.requested, &self.planned_cells()) }
             }
             _ => self.requested.clone(),
         }
@@ -178,10 +183,7 @@ impl WorkloadState {
 
     fn shares_budget(&self, asked: Option<&Budgeted>) -> bool {
         match (&self.first.budgeted, asked) {
-            (Some(own), Some(asked)) => {
-                let strictest = self.sessions.strictest_budget(|_| true);
-                own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
-            }
+            (Some(own), Some(asked)) => own.is_shareable(asked),
             (own, asked) => own.is_none() && asked.is_none(),
         }
     }
@@ -199,12 +201,6 @@ impl WorkloadState {
             true => self.live_viewpoints.remove(&node),
             false => self.live_viewpoints.insert(node, viewpoints),
         };
-    }
-
-    /// Whether a live viewer of a node looks from about the place of a camera.
-    pub(super) fn is_viewed_from(&self, node: &str, camera: &PinholeCamera, least_apart_m: f32) -> bool {
-        let views = self.live_viewpoints.get(node).into_iter().flatten();
-        views.into_iter().any(|view| is_one_place(view, camera, least_apart_m))
     }
 
     /// Viewers have moved, come or gone: cells follow when that is due.
@@ -259,6 +255,13 @@ impl WorkloadState {
         self.has_been_ready && now.saturating_sub(self.active_at) >= IDLE_AFTER
     }
 
+    /// Whether the views of a policy may differ from their truth: those drawn directly with all rays do not.
+    pub(super) fn is_audited_under(&self, policy: Policy) -> bool {
+        let is_direct_row =
+            self.representation.as_ref().is_some_and(|representation| representation.method().is_none());
+        (policy == Policy::Direct) == is_direct_row
+    }
+
     pub(super) fn policy(&self) -> Option<Policy> {
         self.active_plan.as_ref().map(ActivePlan::policy)
     }
@@ -290,9 +293,9 @@ impl WorkloadState {
             None => self.requested.sample_cameras.len(),
             Some(_) => self.requested.view_camera_count(),
         };
-        match (self.representation.as_ref().and_then(Representation::row), &self.first.budgeted) {
-            (Some(row), Some(budgeted)) if !budgeted.keeps_cameras => {
-                row.camera_count as usize * self.cells.as_ref().map_or(1, |cells| cells.grown().len())
+        match self.representation.as_ref().map(|representation| &representation.row) {
+            Some(Row::Samples { camera_count, .. }) => {
+                *camera_count as usize * self.cells.as_ref().map_or(1, |cells| cells.grown().len())
             }
             _ => asked,
         }
@@ -411,7 +414,7 @@ impl WorkloadState {
 
     /// How the views of all sessions are reconstructed: under a fallback, and in a representation.
     pub(super) fn common_method(&self) -> Option<String> {
-        let chosen = self.representation.as_ref().and_then(Representation::row).map(|row| &row.method);
+        let chosen = self.representation.as_ref().and_then(Representation::method);
         self.quality().map(|quality| &quality.method).or(chosen).cloned()
     }
 

@@ -78,12 +78,12 @@ pub fn request(
 }
 
 /// How views are made where nobody names a method: with shared light where light is traced, and directly in plain light, which costs
-/// less than sharing it. Budgets and plain light whose policy asks for samples take views from samples alone.
+/// less than sharing it. In plain light, budgets and policies that ask for samples begin with views from samples alone.
 pub(crate) fn default_method(lighting: &str, Terms { policy, budget }: &Terms) -> String {
     let is_traced = lighting.parse().is_ok_and(|lighting: Lighting| lighting.is_traced());
     match policy {
-        _ if budget.budget.is_some() => ReconstructionMethod::default().to_string(),
         _ if is_traced => ReconstructionMethod::from(LightCacheQuality::default()).to_string(),
+        _ if budget.budget.is_some() => ReconstructionMethod::default().to_string(),
         PolicyChoice::Pipeline | PolicyChoice::TimeShare => ReconstructionMethod::default().to_string(),
         PolicyChoice::Auto | PolicyChoice::Direct => DIRECT.to_owned(),
     }
@@ -230,7 +230,7 @@ mod tests {
         for policy in [PolicyChoice::Auto, PolicyChoice::Direct, PolicyChoice::Pipeline, PolicyChoice::TimeShare] {
             for lighting in ["shadows", "soft 4", "phong, occlusion 8"] {
                 assert_eq!(method(lighting, &policy.into()), "light_cache");
-                assert_eq!(method(lighting, &Terms { policy, budget: budget.clone() }), "joint_carve");
+                assert_eq!(method(lighting, &Terms { policy, budget: budget.clone() }), "light_cache");
             }
         }
         for lighting in ["unlit", "phong", "phong, reflections 2"] {

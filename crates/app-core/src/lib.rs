@@ -3,8 +3,8 @@
 //! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process, and
 //! [`experiment`] a client beside them.
 //! [`quality`] is the quality of shared light. [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
-//! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
-//! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`addresses`] are those of the command line, and [`exit`] defines
+//! reads camera files, and [`camera_record`] writes those of views. [`planning`] has the rows among which budgets
+//! choose, and makes plans. [`addresses`] are those of the command line, and [`exit`] defines
 //! the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -15,10 +15,8 @@ pub mod cluster;
 pub mod delivery;
 pub mod exit;
 pub mod experiment;
-pub mod ladder;
 pub mod live;
 pub mod node_limits;
-pub mod plan_files;
 pub mod planning;
 pub mod process;
 pub mod progress;

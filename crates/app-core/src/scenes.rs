@@ -2,6 +2,7 @@
 
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use coordinator::{SceneOffer, SceneOffers};
+use planner::Budget;
 use scene::{Scene, SceneSpec};
 
 use crate::exit::BadInput;
@@ -18,20 +19,25 @@ pub struct ScenesArgs {
 }
 
 impl ScenesArgs {
-    /// Loads all scenes, and places sample cameras in each. With a budget for all sessions, whose budget chooses among methods, views
-    /// are made from samples alone.
+    /// Checks that the arguments leave a budget its choices.
+    ///
+    /// # Errors
+    /// They name what a budget chooses, or samples that it cannot choose.
+    pub fn check_for_budget(&self, budget: Budget) -> Result<(), BadInput> {
+        self.first.check_for_budget(budget)
+    }
+
+    /// Loads all scenes, and places sample cameras in each.
     ///
     /// # Errors
     /// A scene cannot be used, or is given twice.
-    pub fn load(&self, has_budget: bool) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
+    pub fn load(&self) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
         let mut scenes = Vec::with_capacity(self.scenes.len());
         let mut offers = Vec::with_capacity(self.scenes.len());
         for scene in &self.scenes {
             let args = SceneArgs { scene: scene.clone(), ..self.first.clone() };
             let Setup { scene, mut offer, .. } = args.load()?;
-            if !has_budget {
-                offer.settings.method = args.offered_method().map(|method| method.to_string());
-            }
+            offer.settings.method = args.offered_method().map(|method| method.to_string());
             scenes.push(scene);
             offers.push(offer);
         }

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::builder::{OsStringValueParser, TypedValueParser as _};
 use clap::{Args, Command, FromArgMatches as _};
-use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash};
+use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SamplePlanes, SceneHash, Timeline, Workload};
 use coordinator::{OfferedCell, OfferedCube, SceneOffer};
-use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera};
+use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera};
 use glam::UVec2;
 use gpu::DevicePreference;
+use planner::Budget;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Impostors, Rig, SamplingMethod};
@@ -127,6 +128,26 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// The scene at its start in a light, sampled by these cameras, for work on a device without a cluster.
+    #[must_use]
+    pub fn workload(&self, sampling: SamplingMethod, lighting: Lighting, cameras: &[PinholeCamera]) -> Workload {
+        Workload {
+            scene: self.offer.scene(),
+            sample_cameras: cameras.iter().copied().map(SampleCamera::from).collect(),
+            cell_first_indices: Vec::new(),
+            common_cells: Vec::new(),
+            sampling: sampling.to_string(),
+            lighting: lighting.to_string(),
+            planes: SamplePlanes::default(),
+            volume: self.offer.volume,
+            background: self.offer.background,
+            timeline: Timeline::still(0.0),
+            illumination: self.offer.illumination.clone(),
+            refinement_steps: 1,
+            traced_pixel_count: None,
+        }
+    }
+
     /// Checks that samples are depth images alone, which not all commands can do without.
     ///
     /// # Errors
@@ -200,6 +221,25 @@ impl SceneArgs {
         self.sampling.unwrap_or_else(|| SamplingMethod::suited_to(self.lighting))
     }
 
+    /// Checks that the arguments leave a budget its choices.
+    ///
+    /// # Errors
+    /// They name what a budget chooses, or samples that it cannot choose.
+    pub fn check_for_budget(&self, budget: Budget) -> Result<(), BadInput> {
+        let is_cube = self.sampling.is_some_and(|sampling| sampling.layer_selection().is_some());
+        let named = [
+            (self.method.is_some(), "--method or --quality, which it chooses"),
+            (self.sample_size.fixed_px().is_some(), "--sample-size, which it chooses"),
+            (is_cube, "a layered cube as --sampling"),
+            (self.base.is_some(), "--base"),
+            (self.blocks.is_some(), "--blocks"),
+        ];
+        match named.into_iter().find(|(is_named, _)| *is_named) {
+            Some((_, what)) => Err(BadInput(format!("--budget {budget}: none can be kept with {what}"))),
+            None => Ok(()),
+        }
+    }
+
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
@@ -234,8 +274,6 @@ impl SceneArgs {
             base,
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
-            rows: self.rows(around.len() as u32),
-            keeps_cameras: self.samples.is_some(),
             volume: scene.bounds(),
             background: scene.background,
             illumination: scene.illumination.clone(),

@@ -140,6 +140,7 @@ impl Assignment {
             samplers: samplers.filter(|share| !share.image_indices.is_empty()).collect(),
             compositors: self.compositors.clone(),
             method: self.method.clone(),
+            audit: self.audit.clone(),
             ..*self
         })
     }

@@ -4,35 +4,29 @@ use depth_image::{Antialias, PinholeCamera};
 use planner::{Interval, ViewErrors};
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, at_most, finite_seconds, within};
+use crate::check::{InvalidField, at_most, nonempty, within};
 use crate::limits::MAX_PROBE_VIEWS;
 
 /// The greatest share of a compositor's time that audits may take.
 pub const MAX_AUDIT_TIME_RATIO: f64 = 0.5;
 /// A promise is for views of up to this many times the planned pixels, or of that share of them.
 pub const MOST_PLANNED_PIXELS: f64 = 2.0;
-/// Directions that differ less, in radians, are one.
-const LEAST_TURN: f32 = 1e-3;
 /// More seconds than a report is of.
 const MAX_BUSY_S: f64 = 1e6;
 /// More pixels than any view has.
 const MAX_PIXELS: u32 = 1 << 28;
 
 /// How the views of a plan are audited.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AuditOrder {
     /// The share of a compositor's time, drawing and comparing included: above 0, at most 0.5.
     pub time_ratio: f64,
-    /// A view that is nearer than this to an audited one of its set is not audited, in m.
-    pub least_apart_m: f64,
     /// Samples a pixel of the views that the promise is for.
     pub antialias: Antialias,
     /// Pixels of a view as it was planned for.
     pub planned_pixel_count: u32,
-    /// Views are compared with the sample images, too.
-    pub with_sample_images: bool,
-    /// Of large views a part is compared: the promise is for means.
-    pub in_parts: bool,
+    /// The light of the directly drawn views with which views are compared.
+    pub truth_lighting: String,
 }
 
 /// The audits of a member since its last report.
@@ -72,21 +66,8 @@ pub struct AuditSummary {
     pub covered_views: u64,
     /// Views that the promise is not for.
     pub uncovered_views: u64,
-    /// Audits a second, of late.
-    pub audits_per_s: f64,
-    /// The nodes' time for drawing and comparing, in s.
-    pub busy_s: f64,
     /// The interval of the error as a ratio, however often it is looked at; `None` for too few views.
     pub error: Option<Interval>,
-    /// Viewers that stay where the error is above the budget.
-    pub viewers_above: u32,
-}
-
-/// Whether two cameras are at one place, as far as audits are concerned: nearer than `least_apart_m`, in about one direction.
-#[must_use]
-pub fn is_one_place(a: &PinholeCamera, b: &PinholeCamera, least_apart_m: f32) -> bool {
-    let turn = a.forward_in_world().distance(b.forward_in_world());
-    a.eye_in_world.distance(b.eye_in_world) <= least_apart_m && turn <= LEAST_TURN
 }
 
 impl AuditOrder {
@@ -97,17 +78,13 @@ impl AuditOrder {
             return Err(InvalidField::out_of_range("audit.time_ratio", self.time_ratio, "above 0 and at most 0.5"));
         }
         within(self.planned_pixel_count, 1..=MAX_PIXELS, "audit.planned_pixel_count", "from 1 to 2^28")?;
-        finite_seconds(self.least_apart_m, "audit.least_apart_m")
+        nonempty(&self.truth_lighting, "audit.truth_lighting")
     }
 }
 
 /// Errors of a view are from 0 to 1.
 pub(crate) fn check_view_errors(errors: &ViewErrors) -> Result<(), InvalidField> {
-    within(errors.foreground_ratio, 0.0..=1.0, "foreground_ratio", "from 0 to 1")?;
-    within(errors.flip, 0.0..=1.0, "flip_ratio", "from 0 to 1")?;
-    within(errors.flip_whole, 0.0..=1.0, "flip_whole_ratio", "from 0 to 1")?;
-    within(errors.mean_square, 0.0..=1.0, "mean_square_ratio", "from 0 to 1")?;
-    within(errors.disoccluded_ratio, 0.0..=1.0, "disoccluded_ratio", "from 0 to 1")
+    errors.validate().map_err(|error| InvalidField::out_of_range(error.field, error.value, error.allowed))
 }
 
 impl AuditReport {
@@ -133,8 +110,6 @@ impl AuditSummary {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        finite_seconds(self.audits_per_s, "audit.audits_per_s")?;
-        finite_seconds(self.busy_s, "audit.busy_s")?;
         let Some(Interval { low, mean, high }) = self.error else { return Ok(()) };
         [low, mean, high].into_iter().try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
     }

@@ -27,9 +27,7 @@ mod assignment_tests;
 mod test_support;
 
 pub use assignment::{ApplyPlan, Assignment, CompositorShare, SamplerShare};
-pub use audit::{
-    AuditOrder, AuditReport, AuditSummary, AuditedView, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS, is_one_place,
-};
+pub use audit::{AuditOrder, AuditReport, AuditSummary, AuditedView, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS};
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };

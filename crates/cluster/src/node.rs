@@ -70,16 +70,15 @@ pub struct MeasureCosts {
     pub planes: ViewPlanes,
     /// Nobody waits for it: all other work goes first.
     pub in_background: bool,
-    /// Only samples and views are measured, for a budget.
+    /// The typical views are compared for a budget, and only samples and these views are timed.
     pub budget: Option<BudgetMeasurement>,
 }
 
-/// A measurement of a representation, of which each typical view is made from its own view cell.
+/// A measurement of a way to make views, of which each typical view is made from its own view cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BudgetMeasurement {
-    /// The light in which views are compared with directly drawn ones; `None`: the representation is timed alone, and nothing of
-    /// earlier calls is used.
-    pub compared_lighting: Option<String>,
+    /// The light of the directly drawn views with which the typical views are compared.
+    pub truth_lighting: String,
 }
 
 impl MeasureCosts {
@@ -105,6 +104,7 @@ impl MeasureCosts {
         for view in &self.typical_views {
             view.validate().map_err(|source| InvalidField::Camera { field: "typical_views", source })?;
         }
+        self.budget.as_ref().map_or(Ok(()), |budget| nonempty(&budget.truth_lighting, "truth_lighting"))?;
         match self.typical_views.iter().find(|view| view.size_px != first.size_px) {
             Some(other) => Err(InvalidField::out_of_range("typical_views", other.size_px, "all of one size")),
             None => Ok(()),

@@ -5,32 +5,29 @@ use serde::{Deserialize, Serialize};
 use crate::audit::AuditSummary;
 use crate::check::{InvalidField, nonempty, reason, within};
 
-/// Fewer audits a second, ten an hour, find little.
-const BARELY_PER_S: f64 = 10.0 / 3600.0;
-
-/// A session asks for the cheapest representation that keeps a budget. What its user named stays as it is.
+/// The budget of a session, whose views are then made in the cheapest way that keeps it.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct BudgetRequest {
     /// The budget as on the command line; `None`: the coordinator's, if it has one.
     pub budget: Option<String>,
-    /// The user named the reconstruction method.
+    /// The user named the reconstruction method: the coordinator's budget is not for this session.
     pub names_method: bool,
 }
 
 /// The promise to the sessions of a workload.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Promise {
-    /// The session's budget; of a workload, the one that is planned for.
+    /// The budget.
     pub budget: String,
     /// Whether it is kept.
     pub state: PromiseState,
     /// The representation in force.
     pub representation: String,
-    /// The error of the representation on the views of its certificate, as a ratio; 0 without one.
+    /// The error of the representation on the views of its test, as a ratio; 0 without one.
     pub expected_ratio: f64,
-    /// The bound on the error, as a ratio; 0 without a certificate.
+    /// The bound on the error, as a ratio; 0 without a test.
     pub bound_ratio: f64,
-    /// Views of the certificate.
+    /// Views of the test.
     pub probe_view_count: u32,
     /// The reason in plain words, with the figures.
     pub reason: String,
@@ -41,7 +38,7 @@ pub struct Promise {
 /// The state of a promise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PromiseState {
-    /// Representations are measured; the one in force has no certificate.
+    /// Representations are measured; the one in force was not tested.
     Measuring,
     /// The representation in force keeps the budget.
     Kept,
@@ -66,14 +63,11 @@ impl std::fmt::Display for Promise {
     /// One line: the budget, the state and the reason; while representations are measured, also the one in force.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { budget, state, representation, reason, .. } = self;
-        let remark = match state {
+        let now = match state {
             PromiseState::Measuring => format!(", now {representation}"),
-            PromiseState::Kept if self.audit.is_some_and(|audit| audit.audits_per_s < BARELY_PER_S) => {
-                " (barely watched)".to_owned()
-            }
-            PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => String::new(),
+            _ => String::new(),
         };
-        write!(f, "promise {budget}: {state}{remark}: {reason}")
+        write!(f, "promise {budget}: {state}{now}: {reason}")
     }
 }
 

@@ -45,5 +45,5 @@ pub use service::NodeService;
 pub use set_bytes::{depth_images_bytes, most_image_bytes, most_set_bytes, set_bytes};
 pub use streams::{next_within, until_drained, with_guard};
 pub use telemetry::{NodeMetrics, Reason, Telemetry, init_logging};
-pub use view_probes::{ViewAudit, ViewProbes};
+pub use view_probes::{MadeView, ViewAudit, ViewProbes};
 pub use work_done::{Operation, WorkDone};

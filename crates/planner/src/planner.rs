@@ -1,312 +1,447 @@
-//! The plan as a state machine: events in, commands out.
+//! The plan as a state machine: it says what is to be measured, and takes the answers.
+//!
+//! 1. **Screening.** Rows are compared on common views by successive halving (Jamieson and Talwalkar 2016): on one view, the
+//!    better half on four, and half of these on eight. The first view is for one row of each method, and then for rows that promise more than
+//!    those that were measured, as far as their neighbours say.
+//! 2. **Test.** The best of many rows on few views looks better than it is. Up to three rows are therefore tested on parts of
+//!    fresh views, the safest first, and the first failure ends the test: whatever has passed holds together at 95 %
+//!    (fixed-sequence testing, Angelopoulos et al. 2021).
 
-mod certification;
-mod conclusion;
-mod measurements;
-mod reason;
-mod remembering;
-mod screening;
-mod state;
+use serde::{Deserialize, Serialize};
 
-use state::{Round, RowState, Stage, Work};
+use crate::budget::Budget;
+use crate::invalid::{InvalidField, within};
+use crate::moments::upper_bound;
+use crate::probe_view::ProbeView;
+use crate::row::{Demand, MAX_ROWS, Row, RowCosts};
+use crate::view_errors::ViewErrors;
 
-use crate::budget::{Budget, ErrorTerm};
-use crate::command::{Command, Purpose};
-use crate::cost_model::CostModel;
-use crate::costs::{Price, Pricing};
-use crate::event::{Event, ProbeId};
-use crate::evidence::Evidence;
-use crate::invalid::{InvalidField, MAX_NAME_BYTES, name, seconds, within};
-use crate::kept::{Certificate, Kept, KeptKey, KeptSearch};
-use crate::ladder::{Ladder, Row};
-use crate::metric::Metric;
-use crate::outcome::{Choice, Outcome, PromiseState, RowSummary};
+/// Common views of each comparison.
+const VIEWS: [usize; 3] = [1, 4, 8];
+/// Fresh views of a test.
+const FRESH_VIEWS: usize = 20;
+/// Rows that are left after screening.
+const FINALISTS: usize = 4;
+/// The most rows that are measured.
+const MOST_MEASURED: usize = 20;
+/// Of the rows with at most each of these shares of the budget's error the cheapest is tested.
+const TESTED_AT: [f64; 3] = [0.5, 0.75, 1.0];
+/// A row is worth a test where it saves this share of the price of the one that was tested before.
+const WORTHWHILE: f64 = 0.02;
 
-/// Views and repetitions with which finalists are timed.
-const TIMED_VIEWS: usize = 32;
-const TIMED_REPEATS: usize = 2;
-/// A measured time may be wrong by this.
-const TOLERANCE: f64 = 1.02;
-/// The most that a measured time may be over its limit where a row is chosen.
-const EXACT: f64 = 1.0;
-/// The least that a time is predicted to be may be wrong by this.
-const PREDICTED_TOLERANCE: f64 = 1.15;
-/// A measured time below this share of its limit is within it.
-const CLEARLY_IN_TIME: f64 = 0.95;
-
-/// Rows of a round of certificates; fewer where every true view is expensive.
-const MOST_CERTIFIED: usize = 8;
-const MOST_CERTIFIED_TRACED: usize = 3;
-
-/// The rows of a round of certificates, where rays of light are traced and elsewhere.
-#[must_use]
-pub fn most_certified(is_traced: bool) -> usize {
-    if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED }
+/// A measurement's plan, and its number within the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ProbeId {
+    /// No two plans have the same number.
+    pub plan: u64,
+    /// From 1.
+    pub number: u64,
 }
 
-/// A device's name as plans have it: cut off where it is too long.
-#[must_use]
-pub fn device_name(name: &str) -> String {
-    let name = if name.is_empty() { "unknown" } else { name };
-    name[..name.floor_char_boundary(MAX_NAME_BYTES)].to_owned()
+/// A measurement that a plan asks for: the errors of a row on some views, and its costs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// The answer repeats it.
+    pub id: ProbeId,
+    /// The place of the row.
+    pub row: usize,
+    /// At least one.
+    pub views: Vec<ProbeView>,
+}
+
+/// The answer to a [`Probe`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Probed {
+    /// The measurement.
+    pub id: ProbeId,
+    /// The errors of the views, in their order.
+    pub views: Vec<ViewErrors>,
+    /// The costs of the row.
+    pub costs: RowCosts,
+    /// The nodes' time for it, in s.
+    pub busy_s: f64,
 }
 
 /// A plan to make.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanRequest {
-    /// The number of the plan, which its measurements repeat.
-    pub plan: u64,
+    /// The number of the plan: it also chooses the fresh views.
+    pub number: u64,
     /// The budget to keep.
     pub budget: Budget,
-    /// The scene and the settings that errors depend on.
-    pub key: KeptKey,
-    /// The device that measures costs.
-    pub device: String,
-    /// The version of the program that measures.
-    pub program_version: String,
-    /// The terms of prices beside costs, as a text. A search is not made again on the same terms, though drawing directly may
-    /// cost a little more or less.
-    pub pricing: String,
-    /// The nodes' time that measuring may take in all, in s.
-    pub allowance_s: f64,
-    /// Rows of a round of certificates, 1 to 8: fewer where light is expensive.
-    pub most_certified: usize,
-    /// The seed of fresh views and of tests of pruning, which draw different numbers from it.
-    pub seed: u64,
+    /// The rows to choose from, with the coarsest samples first.
+    pub rows: Vec<Row>,
+    /// The place of the row whose views are the truth, if it may be chosen. It keeps every budget.
+    pub exact: Option<usize>,
+    /// The work that the views are part of.
+    pub demand: Demand,
 }
 
-/// A plan: it chooses the cheapest row of a ladder, or direct drawing, that keeps a budget.
+/// The error of a row on fresh views.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestedError {
+    /// The mean over the foreground, as a ratio.
+    pub mean_ratio: f64,
+    /// The bound on that mean at 95 %, as a ratio.
+    pub bound_ratio: f64,
+    /// The mean share of foreground in the views.
+    pub foreground_ratio: f64,
+    /// The number of views.
+    pub views: usize,
+}
+
+/// The result of a plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The rows that keep the budget, the cheapest first; none where nothing is known to keep it. All but the exact one were
+    /// tested.
+    pub kept: Vec<usize>,
+    /// The choice and the reason in one sentence.
+    pub reason: String,
+}
+
+/// The measurements of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowSummary {
+    /// The mean error over the foreground of all common views, as a ratio; `None` where it was not measured.
+    pub error_ratio: Option<f64>,
+    /// The nodes' time for a view, in s; infinite where it was not measured.
+    pub price_s: f64,
+    /// The test on fresh views that the row has passed.
+    pub tested: Option<TestedError>,
+}
+
+/// A plan: it finds the cheapest row that keeps a budget.
 #[derive(Debug, Clone)]
-pub struct Planner<P> {
+pub struct Planner {
     request: PlanRequest,
-    ladder: Ladder,
-    pricing: P,
     rows: Vec<RowState>,
-    /// The prices of rows, from measured costs or predicted ones.
-    prices: Vec<Price>,
-    /// The same; of predicted costs one standard deviation less.
-    least_prices: Vec<Price>,
-    model: CostModel,
     stage: Stage,
-    round: Round,
-    pending: Option<(ProbeId, Work)>,
-    probe_number: u64,
-    fresh_views_drawn: u64,
-    /// The searches of earlier plans.
-    searches: Vec<KeptSearch>,
-    finalists_were_timed: bool,
+    pending: Option<Probe>,
+    probe_count: u64,
     spent_s: f64,
-    allowance_s: f64,
-    outcome: Option<Outcome>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct RowState {
+    common: Vec<ViewErrors>,
+    /// Costs of all measurements.
+    costs: Vec<RowCosts>,
+    is_dropped: bool,
+    tested: Option<TestedError>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Stage {
+    /// Rows are compared on the common views of this round.
+    Screening {
+        round: usize,
+    },
+    /// Rows from the safest to the cheapest, and the place of the one that is tested.
+    Testing {
+        sequence: Vec<usize>,
+        place: usize,
+    },
+    Concluded(Outcome),
 }
 
 impl PlanRequest {
     fn validate(&self) -> Result<(), InvalidField> {
-        self.key.validate()?;
-        name(&self.device, "device")?;
-        name(&self.program_version, "program_version")?;
-        name(&self.pricing, "pricing")?;
-        within(self.most_certified, 1..=8, "most_certified", "from 1 to 8")?;
-        seconds(self.allowance_s, "allowance_s")
+        within(self.rows.len(), 1..=MAX_ROWS, "rows", "from 1 to 49")?;
+        self.rows.iter().try_for_each(Row::validate)?;
+        within(self.exact.unwrap_or(0), 0..=self.rows.len() - 1, "exact", "the place of a row")
     }
 }
 
-impl<P: Pricing> Planner<P> {
-    /// A plan that waits for [`Event::Remembered`].
-    ///
+impl Probed {
     /// # Errors
     /// For a value that its field does not allow.
-    pub fn new(request: PlanRequest, ladder: Ladder, pricing: P) -> Result<Self, InvalidField> {
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        within(self.views.len(), 1..=FRESH_VIEWS, "views", "from 1 to 20")?;
+        self.views.iter().try_for_each(ViewErrors::validate)?;
+        within(self.busy_s, 0.0..=1e6, "busy_s", "from 0 to 10^6")?;
+        self.costs.validate()
+    }
+}
+
+impl Planner {
+    /// # Errors
+    /// For rows that are none, too many or invalid.
+    pub fn new(request: PlanRequest) -> Result<Self, InvalidField> {
         request.validate()?;
-        let model = CostModel::fit(&[]);
-        let mut planner = Self {
-            rows: ladder.rows().iter().map(|_| RowState::default()).collect(),
-            prices: Vec::new(),
-            least_prices: Vec::new(),
-            model,
-            stage: Stage::Waiting,
-            round: Round::default(),
-            pending: None,
-            probe_number: 0,
-            fresh_views_drawn: 0,
-            searches: Vec::new(),
-            finalists_were_timed: false,
-            spent_s: 0.0,
-            allowance_s: request.allowance_s,
-            outcome: None,
-            request,
-            ladder,
-            pricing,
-        };
-        planner.predict();
-        Ok(planner)
+        let rows = vec![RowState::default(); request.rows.len()];
+        let stage = Stage::Screening { round: 0 };
+        Ok(Self { request, rows, stage, pending: None, probe_count: 0, spent_s: 0.0 })
     }
 
-    /// The commands that follow from an event. An impossible event is refused and changes nothing.
-    pub fn step(&mut self, event: Event) -> Vec<Command> {
-        match self.apply(event) {
-            Ok(()) => self.advance(),
-            Err(error) => vec![Command::Refuse(error)],
-        }
-    }
-
-    /// The result, or the state of a plan that is being made.
-    #[must_use]
-    pub fn outcome(&self) -> Outcome {
-        self.outcome.clone().unwrap_or_else(|| self.outcome_of(self.choice().0, PromiseState::Measuring, false))
-    }
-
-    /// The rows of the ladder, in order.
-    #[must_use]
-    pub fn summaries(&self) -> Vec<RowSummary> {
-        (0..self.rows.len()).map(|row| self.summary(row)).collect()
-    }
-
-    /// The measurements so far, for later plans.
-    #[must_use]
-    pub fn measured(&self) -> Kept {
-        self.kept(Choice::Direct, true)
-    }
-
-    /// Rows that are certified for the budget and within its time, the cheapest first.
-    #[must_use]
-    pub fn certified(&self) -> Vec<(Choice, Price, Certificate)> {
-        let rows = self.eligible(EXACT).into_iter().filter(|&row| self.is_measured_for_time(row)).map(Choice::Row);
-        rows.filter_map(|row| Some((row, self.price_of(row), self.certificate_of(row)?.clone()))).collect()
-    }
-
-    /// The nodes' time that measuring has taken, in s.
-    #[must_use]
-    pub fn spent_s(&self) -> f64 {
-        self.spent_s
-    }
-
-    fn apply(&mut self, event: Event) -> Result<(), InvalidField> {
-        event.validate()?;
-        match event {
-            Event::Remembered(kept) => self.remember(kept),
-            Event::Probed(probed) => self.probed(&probed),
-            Event::Timed(timed) => self.timed(&timed),
-            Event::Failed { id, busy_s, .. } => self.failed(id, busy_s),
-            Event::Allowed { allowance_s } => {
-                self.allowance_s = allowance_s;
-                Ok(())
+    /// The measurement that is wanted, the same until it is answered; `None` once the plan is made.
+    pub fn next_probe(&mut self) -> Option<Probe> {
+        while self.pending.is_none() {
+            match self.next_row() {
+                Some((row, views)) => {
+                    self.probe_count += 1;
+                    let id = ProbeId { plan: self.request.number, number: self.probe_count };
+                    self.pending = Some(Probe { id, row, views });
+                }
+                None if self.outcome().is_some() => return None,
+                None => self.stage = self.next_stage(),
             }
         }
+        self.pending.clone()
     }
 
-    /// Whether measuring has taken all the time that it may take.
-    #[must_use]
-    pub fn is_spent(&self) -> bool {
-        self.spent_s >= self.allowance_s
-    }
-
-    fn advance(&mut self) -> Vec<Command> {
-        let is_spent = self.is_spent();
-        if self.stage.is_idle() || (self.pending.is_some() && !is_spent) {
-            return Vec::new();
+    /// Takes an answer. One that nobody waits for changes nothing.
+    ///
+    /// # Errors
+    /// For an answer that is impossible: the row counts as failed.
+    pub fn answer(&mut self, probed: &Probed) -> Result<(), InvalidField> {
+        let Some(probe) = self.pending.take_if(|probe| probe.id == probed.id) else { return Ok(()) };
+        let count = probe.views.len();
+        let valid =
+            probed.validate().and_then(|()| within(probed.views.len(), count..=count, "views", "those asked for"));
+        if valid.is_err() {
+            self.drop_row(probe.row);
+            return valid;
         }
-        loop {
-            match self.next_work() {
-                Some(_) if is_spent => return self.conclude(true),
-                Some(work) => return vec![self.issue(work)],
-                None if self.stage == Stage::Timing => return self.conclude(false),
-                None => self.next_stage(),
+        self.spent_s += probed.busy_s;
+        let row = &mut self.rows[probe.row];
+        match &mut self.stage {
+            Stage::Testing { place, sequence } => {
+                row.tested = tested(&probed.views, &self.request.budget);
+                *place = if row.tested.is_some() { *place + 1 } else { sequence.len() };
+            }
+            _ => {
+                row.common.extend(&probed.views);
+                row.costs.extend(probe.views[0].is_whole().then_some(probed.costs));
             }
         }
+        Ok(())
     }
 
-    fn next_work(&self) -> Option<Work> {
-        match self.stage {
-            Stage::Waiting | Stage::Concluded => None,
-            Stage::Screening => self.next_screening(),
-            Stage::Certifying => self.next_certification(),
-            Stage::Timing => self.next_timing(),
+    /// A row cannot be measured: it is not chosen.
+    pub fn fail(&mut self, id: ProbeId) {
+        if let Some(probe) = self.pending.take_if(|probe| probe.id == id) {
+            self.drop_row(probe.row);
         }
     }
 
-    /// Time alone needs no certificate: nothing is promised about errors.
-    fn next_stage(&mut self) {
-        let needs_certificates = self.stage == Stage::Screening && self.term().is_some();
-        let is_further_round = self.stage == Stage::Certifying && self.reconsider();
-        self.stage = match (needs_certificates, is_further_round) {
-            (true, _) => Stage::Certifying,
-            (_, true) => Stage::Screening,
-            _ => Stage::Timing,
+    /// The result, once the plan is made.
+    #[must_use]
+    pub fn outcome(&self) -> Option<&Outcome> {
+        match &self.stage {
+            Stage::Concluded(outcome) => Some(outcome),
+            _ => None,
+        }
+    }
+
+    /// The request.
+    #[must_use]
+    pub fn request(&self) -> &PlanRequest {
+        &self.request
+    }
+
+    /// The measurements of a row, if there is such a row.
+    #[must_use]
+    pub fn summary(&self, row: usize) -> Option<RowSummary> {
+        let state = self.rows.get(row)?;
+        let error_ratio = (!state.common.is_empty()).then(|| self.error_ratio(row));
+        Some(RowSummary { error_ratio, price_s: self.price_s(row), tested: state.tested })
+    }
+
+    /// The measured costs of a row, the median of each; `None` where it was not measured.
+    #[must_use]
+    pub fn costs(&self, row: usize) -> Option<RowCosts> {
+        let all = &self.rows.get(row)?.costs;
+        let median = |cost: fn(&RowCosts) -> f64| {
+            let mut values: Vec<f64> = all.iter().map(cost).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
         };
-        if needs_certificates {
-            self.begin_round();
+        Some(RowCosts {
+            sample_image_s: median(|costs| costs.sample_image_s)?,
+            load_set_s: median(|costs| costs.load_set_s)?,
+            view_s: median(|costs| costs.view_s)?,
+        })
+    }
+
+    /// The nodes' time that measuring has taken, in s, and the number of measurements.
+    #[must_use]
+    pub fn spent(&self) -> (f64, u64) {
+        (self.spent_s, self.probe_count)
+    }
+
+    fn drop_row(&mut self, row: usize) {
+        self.rows[row].is_dropped = true;
+        if let Stage::Testing { sequence, place } = &mut self.stage {
+            *place = sequence.len();
         }
     }
 
-    fn issue(&mut self, work: Work) -> Command {
-        self.probe_number += 1;
-        let id = ProbeId { plan: self.request.plan, number: self.probe_number };
-        self.pending = Some((id, work.clone()));
-        match work {
-            Work::Screen { row, views } => Command::Probe { id, row, views, purpose: Purpose::Screening },
-            Work::Certify { row, views } => Command::Probe { id, row, views, purpose: Purpose::Certification },
-            Work::Time { rows } => Command::Time { id, rows, view_count: TIMED_VIEWS, repeats: TIMED_REPEATS },
+    /// The next row to measure, and on which views.
+    fn next_row(&self) -> Option<(usize, Vec<ProbeView>)> {
+        match &self.stage {
+            Stage::Screening { round: 0 } => {
+                let row = self.next_to_compare()?;
+                Some((row, vec![ProbeView::Common(0)]))
+            }
+            Stage::Screening { round } => {
+                let row = self.left().into_iter().find(|&row| self.rows[row].common.len() < VIEWS[*round])?;
+                let missing = self.rows[row].common.len()..VIEWS[*round];
+                let views: Vec<ProbeView> = missing.map(|view| ProbeView::Common(view as u64)).collect();
+                // The views of one measurement have one size.
+                let alike = views.iter().take_while(|view| view.is_whole() == views[0].is_whole()).count();
+                Some((row, views[..alike].to_vec()))
+            }
+            Stage::Testing { sequence, place } => {
+                let row = *sequence.get(*place)?;
+                Some((row, (0..FRESH_VIEWS).map(|view| ProbeView::Fresh(view as u64)).collect()))
+            }
+            Stage::Concluded(_) => None,
         }
     }
 
-    fn term(&self) -> Option<ErrorTerm> {
-        self.request.budget.error()
-    }
-
-    fn row(&self, row: usize) -> &Row {
-        &self.ladder.rows()[row]
-    }
-
-    fn evidence(&self, row: usize, term: ErrorTerm) -> Evidence<'_> {
-        Evidence { term, errors: &self.rows[row].errors }
-    }
-
-    /// Whether a row may be within the budget's time.
-    fn is_in_time(&self, row: usize, tolerance: f64) -> bool {
-        let tolerance = if self.rows[row].costs.is_some() { tolerance } else { PREDICTED_TOLERANCE };
-        self.request.budget.most_view_s().is_none_or(|limit| self.least_prices[row].view_s <= limit * tolerance)
-    }
-
-    /// Whether measured costs say that a row is within the budget's time.
-    fn is_clearly_in_time(&self, row: usize) -> bool {
-        self.is_measured_for_time(row) && self.is_in_time(row, CLEARLY_IN_TIME)
-    }
-
-    /// Whether the costs of a row are measured, where the budget has a time.
-    fn is_measured_for_time(&self, row: usize) -> bool {
-        self.request.budget.most_view_s().is_none() || self.rows[row].costs.is_some()
-    }
-
-    /// The cost of drawing directly; `None` where that takes longer than the budget allows.
-    fn direct_in_time(&self) -> Option<Price> {
-        let direct = self.pricing.direct();
-        let is_in_time = self.request.budget.most_view_s().is_none_or(|limit| direct.view_s <= limit);
-        (is_in_time && direct.node_s.is_finite()).then_some(direct)
-    }
-
-    fn summary(&self, row: usize) -> RowSummary {
-        let state = &self.rows[row];
-        RowSummary {
-            status: state.status,
-            screening_views: state.screening_views,
-            error_ratio: (!state.errors.is_empty()).then(|| self.error_ratio(row)),
-            price: self.prices[row],
-            is_measured: state.costs.is_some(),
+    /// The next row that is compared on the first view: the exact one, the middle one of each method, and then the most
+    /// promising one, as long as it is among the best.
+    fn next_to_compare(&self) -> Option<usize> {
+        let exact = self.request.exact.filter(|&exact| !self.rows[exact].is_dropped && !self.is_measured(exact));
+        if exact.is_some() {
+            return exact;
         }
+        let candidates: Vec<usize> =
+            (0..self.rows.len()).filter(|&row| !self.rows[row].is_dropped && !self.is_exact(row)).collect();
+        let rows = &self.request.rows;
+        for &row in &candidates {
+            let alike = candidates.iter().copied().filter(|&other| rows[row].doublings_from(&rows[other]).is_some());
+            let alike: Vec<usize> = alike.collect();
+            if !alike.iter().any(|&other| self.is_measured(other)) {
+                return Some(alike[alike.len() / 2]);
+            }
+        }
+        if candidates.iter().filter(|&&row| self.is_measured(row)).count() >= MOST_MEASURED {
+            return None;
+        }
+        let mut by_score = candidates;
+        by_score.sort_by(|&a, &b| self.expected_score(a).total_cmp(&self.expected_score(b)));
+        by_score.truncate(FINALISTS);
+        by_score.into_iter().find(|&row| !self.is_measured(row))
     }
 
-    /// The error that the budget limits; FLIP for a budget of time.
+    /// Measured rows that may be chosen.
+    fn left(&self) -> Vec<usize> {
+        let rows = 0..self.rows.len();
+        rows.filter(|&row| self.is_measured(row) && !self.rows[row].is_dropped && !self.is_exact(row)).collect()
+    }
+
+    fn next_stage(&mut self) -> Stage {
+        let Stage::Screening { round } = self.stage else { return Stage::Concluded(self.conclusion()) };
+        let mut left = self.left();
+        if round + 1 == VIEWS.len() {
+            return Stage::Testing { sequence: self.sequence(), place: 0 };
+        }
+        left.sort_by(|&a, &b| self.expected_score(a).total_cmp(&self.expected_score(b)));
+        for row in left.split_off(left.len().min((left.len() / 2).max(FINALISTS))) {
+            self.rows[row].is_dropped = true;
+        }
+        Stage::Screening { round: round + 1 }
+    }
+
+    fn is_measured(&self, row: usize) -> bool {
+        !self.rows[row].common.is_empty()
+    }
+
+    fn is_exact(&self, row: usize) -> bool {
+        self.request.exact == Some(row)
+    }
+
     fn error_ratio(&self, row: usize) -> f64 {
-        match self.term() {
-            Some(term) => self.evidence(row, term).estimate(),
-            None => {
-                let errors = &self.rows[row].errors;
-                let [at_0, at_1] =
-                    [0.0, 1.0].map(|limit| errors.iter().map(|errors| errors.excess(Metric::Flip, limit)).sum::<f64>());
-                // The sum of the weights is that of y at 0 less that of y at 1.
-                at_0 / (at_0 - at_1).max(f64::MIN_POSITIVE)
+        ViewErrors::mean_error(&self.rows[row].common, &self.request.budget)
+    }
+
+    fn price_s(&self, row: usize) -> f64 {
+        let costs = self.costs(row);
+        costs.map_or(f64::INFINITY, |costs| self.request.demand.price_s(&self.request.rows[row], &costs))
+    }
+
+    /// The price, raised by what the error is over the budget; of a row that was not measured as its nearest neighbour says.
+    fn expected_score(&self, row: usize) -> f64 {
+        let own = &self.request.rows[row];
+        let measured = (0..self.rows.len()).filter(|&other| self.is_measured(other) && !self.is_exact(other));
+        let alike = measured.filter_map(|other| Some((other, own.doublings_from(&self.request.rows[other])?)));
+        let nearest = alike.min_by(|(_, a), (_, b)| a.distance().total_cmp(&b.distance()));
+        let Some((other, doublings)) = nearest else { return f64::INFINITY };
+        let costs = doublings.costs(&self.costs(other).unwrap_or_default());
+        let error_ratio = self.error_ratio(other) * doublings.error_ratio();
+        let over = error_ratio / self.request.budget.most_ratio();
+        self.request.demand.price_s(own, &costs) * over.max(1.0).powi(4)
+    }
+
+    /// The rows to test, from the safest to the cheapest.
+    fn sequence(&self) -> Vec<usize> {
+        let most_ratio = self.request.budget.most_ratio();
+        let mut least_s = self.request.exact.map_or(f64::INFINITY, |exact| self.price_s(exact));
+        let mut sequence = Vec::new();
+        for share in TESTED_AT {
+            let safe = (0..self.rows.len()).filter(|&row| {
+                self.is_measured(row) && !self.is_exact(row) && self.error_ratio(row) <= share * most_ratio
+            });
+            let cheapest = safe.min_by(|&a, &b| self.price_s(a).total_cmp(&self.price_s(b)));
+            let cheapest = cheapest.filter(|&row| self.price_s(row) < least_s * (1.0 - WORTHWHILE));
+            least_s = cheapest.map_or(least_s, |row| self.price_s(row));
+            sequence.extend(cheapest);
+        }
+        sequence
+    }
+
+    fn conclusion(&self) -> Outcome {
+        let exact = self.request.exact.filter(|&exact| self.price_s(exact).is_finite());
+        let tested = (0..self.rows.len()).filter(|&row| self.rows[row].tested.is_some() && !self.is_exact(row));
+        let mut kept: Vec<usize> = tested.chain(exact).collect();
+        kept.sort_by(|&a, &b| self.price_s(a).total_cmp(&self.price_s(b)));
+        Outcome { reason: self.reason(kept.first().copied()), kept }
+    }
+
+    fn reason(&self, chosen: Option<usize>) -> String {
+        let PlanRequest { budget, rows, exact, .. } = &self.request;
+        let direct = exact.map_or_else(String::new, |exact| {
+            format!(", against {} for drawing directly with all rays", milliseconds(self.price_s(exact)))
+        });
+        match (chosen, chosen.and_then(|row| self.rows[row].tested)) {
+            (Some(row), Some(TestedError { mean_ratio, bound_ratio, views, .. })) => format!(
+                "{} keeps {budget}: {} on {views} fresh views, at most {} with 95 % confidence; it costs {} a view{direct}.",
+                rows[row],
+                budget.shown(mean_ratio),
+                budget.shown(bound_ratio),
+                milliseconds(self.price_s(row)),
+            ),
+            (Some(row), None) => format!(
+                "Drawing directly with all rays keeps {budget} at {} a view, and nothing cheaper is known to keep it.",
+                milliseconds(self.price_s(row))
+            ),
+            (None, _) => {
+                let measured = (0..rows.len()).filter(|&row| !self.rows[row].common.is_empty());
+                let nearest = measured.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b)));
+                let nearest = nearest.map_or_else(String::new, |row| {
+                    format!("; {} comes nearest with {}", rows[row], budget.shown(self.error_ratio(row)))
+                });
+                format!("Nothing is known to keep {budget}{nearest}.")
             }
         }
     }
+}
+
+/// The test of a budget on fresh views; `None` where it fails.
+fn tested(views: &[ViewErrors], budget: &Budget) -> Option<TestedError> {
+    let excess: Vec<f64> = views.iter().map(|view| view.excess(budget)).collect();
+    let foreground_ratio = views.iter().map(|view| view.foreground_ratio).sum::<f64>() / views.len() as f64;
+    let bound = upper_bound(&excess).filter(|&bound| bound <= 0.0 && foreground_ratio > 0.0)?;
+    Some(TestedError {
+        mean_ratio: ViewErrors::mean_error(views, budget),
+        bound_ratio: (budget.most_ratio() + bound / foreground_ratio).max(0.0),
+        foreground_ratio,
+        views: views.len(),
+    })
+}
+
+fn milliseconds(seconds: f64) -> String {
+    format!("{:.1} ms", seconds * 1e3)
 }

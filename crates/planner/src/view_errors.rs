@@ -1,74 +1,54 @@
-//! Errors of one view, and what they say about a budget.
+//! Errors of one view.
 
 use serde::{Deserialize, Serialize};
 
-use crate::budget::{ErrorTerm, Statistic};
+use crate::budget::{Budget, Metric};
 use crate::invalid::{InvalidField, within};
-use crate::metric::Metric;
 
-/// Views with a smaller share of foreground do not count where each view is judged by itself.
-const LEAST_FOREGROUND_RATIO: f64 = 0.01;
-
-/// Errors of a view against its truth, which is drawn directly. All are from 0 to 1; those over the foreground are 0 where
-/// there is none.
+/// Errors of a view, or of a part of one, against the same drawn directly. All are from 0 to 1; errors are 0 where no pixel
+/// shows a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ViewErrors {
     /// The share of pixels that show a surface in either picture.
     pub foreground_ratio: f64,
     /// Mean FLIP over the foreground.
     pub flip: f64,
-    /// Mean FLIP over all pixels.
-    pub flip_whole: f64,
     /// Mean squared error over the foreground, of a full scale of 1.
     pub mean_square: f64,
-    /// The share of the foreground that no sample camera sees.
-    pub disoccluded_ratio: f64,
 }
 
 impl ViewErrors {
+    /// A view that equals its truth.
+    pub const NONE: Self = Self { foreground_ratio: 1.0, flip: 0.0, mean_square: 0.0 };
+
     /// # Errors
     /// For a value that is not from 0 to 1, by its field.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        for (value, field) in self.values().into_iter().zip(FIELDS) {
-            within(value, 0.0..=1.0, field, "from 0 to 1")?;
-        }
-        Ok(())
+        within(self.foreground_ratio, 0.0..=1.0, "foreground_ratio", "from 0 to 1")?;
+        within(self.flip, 0.0..=1.0, "flip_ratio", "from 0 to 1")?;
+        within(self.mean_square, 0.0..=1.0, "mean_square_ratio", "from 0 to 1")
     }
 
-    /// All values, in the order of the fields.
-    pub(crate) fn values(&self) -> [f64; 5] {
-        [self.foreground_ratio, self.flip, self.flip_whole, self.mean_square, self.disoccluded_ratio]
-    }
-
-    /// The error that a term limits, as a ratio.
+    /// The error that a budget limits, as a ratio.
     #[must_use]
-    pub fn error_ratio(&self, metric: Metric) -> f64 {
-        match metric {
+    pub fn error_ratio(&self, budget: &Budget) -> f64 {
+        match budget.metric() {
             Metric::Flip => self.flip,
-            Metric::FlipWhole => self.flip_whole,
             Metric::Psnr => self.mean_square,
-            Metric::Disocclusion => self.disoccluded_ratio,
         }
     }
 
-    /// The share of pixels that an error is the mean of.
+    /// y: the mean over all pixels of foreground · (error − limit). A budget is kept where the expected value is at most 0.
     #[must_use]
-    pub fn weight(&self, metric: Metric) -> f64 {
-        if metric == Metric::FlipWhole { 1.0 } else { self.foreground_ratio }
+    pub fn excess(&self, budget: &Budget) -> f64 {
+        self.foreground_ratio * (self.error_ratio(budget) - budget.most_ratio())
     }
 
-    /// y: the mean over all pixels of foreground · (error − `most_ratio`). A budget holds in the mean where the expected
-    /// value is at most 0.
+    /// The mean error over the foreground of all views together, as a ratio; 0 without a foreground.
     #[must_use]
-    pub fn excess(&self, metric: Metric, most_ratio: f64) -> f64 {
-        self.weight(metric) * (self.error_ratio(metric) - most_ratio)
-    }
-
-    /// Whether the view counts for a term. Where each view is judged by itself, it has to show something.
-    #[must_use]
-    pub fn counts_for(&self, term: &ErrorTerm) -> bool {
-        term.statistic() == Statistic::Mean || self.weight(term.metric()) >= LEAST_FOREGROUND_RATIO
+    pub fn mean_error(views: &[Self], budget: &Budget) -> f64 {
+        let foreground: f64 = views.iter().map(|view| view.foreground_ratio).sum();
+        let error: f64 = views.iter().map(|view| view.foreground_ratio * view.error_ratio(budget)).sum();
+        error / foreground.max(f64::MIN_POSITIVE)
     }
 }
-
-const FIELDS: [&str; 5] = ["foreground_ratio", "flip", "flip_whole", "mean_square", "disoccluded_ratio"];

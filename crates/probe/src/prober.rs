@@ -1,327 +1,185 @@
-//! The errors and the costs of representations, measured on one device.
+//! The errors and the costs of one way to make views of a scene.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use codec::{
-    DecodeError, DecodeLimits, EncodedImage, FrameCodec, FrameError, decode_depth_image, encode_sample_image,
-    encode_view,
-};
-use depth_image::{DepthImage, PinholeCamera, SampleImageError, View, ViewPlanes};
-use metrics::MetricsError;
-use node::{Engine, EngineError, SampleWork, SharedSet, Turn, ViewWork, own_time};
-use planner::{RowCosts, ViewErrors, median};
+use cluster::{BudgetMeasurement, Costs, DIRECT, MeasureCosts, Workload};
+use codec::{DecodeLimits, decode_sample_image, encode_sample_image};
+use depth_image::{PinholeCamera, SampleCamera, View, ViewPlanes};
+use glam::UVec2;
+use node::{DirectWork, Engine, SampleSet, SampleWork, SharedSet, Turn, ViewWork, own_time, push_latest};
+use planner::ViewErrors;
 use rayon::prelude::*;
+use tonic::Status;
 
 use crate::errors_of_views::view_errors;
-use crate::sets::{SampledSet, SetKey, Sets};
-use crate::subject::{Light, Representation, Subject, Viewpoints};
 
-/// Views that are timed at once, at least, unless they are large: a batch has fixed costs.
-const TIMED_VIEWS: usize = 16;
-/// Views of one call take no longer than this, in s, but for a single one: other work waits for a call, and so does the end of
-/// the process.
-const CALL_S: f64 = 1.0;
-/// True views of one call, which may be lit by many rays.
-const TRUTHS_A_CALL: usize = 8;
-/// Times that views are drawn directly for their cost.
-const DIRECT_RUNS: usize = 3;
-/// The most pixels of views that are only timed.
-const TIMED_PIXELS: usize = 1 << 20;
-/// The bytes of a true view: colour and depth.
-const TRUTH_BYTES_PER_PIXEL: usize = 7;
-/// The most bytes of true views in memory; beyond, they are drawn again when they are needed.
-const MAX_TRUTH_BYTES: usize = 512 << 20;
+/// Views of one call: other work of the device waits for a call.
+const VIEWS_A_CALL: usize = 4;
+/// Texels of the sample sets that are kept, beside the newest: those of about half a gigabyte.
+const MOST_TEXELS: usize = 16 << 20;
+/// The size in which shaders are built.
+const SMALL_PX: UVec2 = UVec2::new(32, 24);
+/// True views that are kept: all of two plans.
+const MOST_TRUTHS: usize = 64;
 
-/// Why a representation cannot be measured.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming")]
-pub enum ProbeError {
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    #[error("a sample image cannot be encoded: {0}")]
-    Encode(#[from] SampleImageError),
-    #[error("a sample image cannot be decoded: {0}")]
-    Decode(#[from] DecodeError),
-    #[error("codec: {0}")]
-    Frame(#[from] FrameError),
-    #[error("views cannot be compared: {0}")]
-    Metrics(#[from] MetricsError),
-}
-
-/// The costs of views that are drawn from the scene, in s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DirectCosts {
-    /// g_v.
-    pub direct_view_s: f64,
-    /// e.
-    pub encode_view_s: f64,
-}
-
-/// Views of a representation, with what they were made of.
-#[derive(Debug, Clone)]
-pub struct Measured {
-    /// The views.
-    pub views: Vec<View>,
-    /// The sample images as compositors decode them.
-    pub sample_images: Vec<DepthImage>,
-    /// Bytes of the encoded set.
-    pub set_bytes: usize,
-    /// The costs, with g_s in the light of the images.
-    pub costs: RowCosts,
-}
-
-/// Measures representations of one subject. Work is in `turn` among other work of the device, and the time for which it
-/// waits does not count. The views of one call have one size.
-pub struct Prober {
+/// Measures ways to make views of one scene. Work is in `turn` among other work of the device, and the time for which it waits
+/// does not count.
+pub(crate) struct Prober {
     engine: Arc<dyn Engine>,
-    subject: Subject,
     turn: Turn,
-    truths: BTreeMap<(Light, CameraBits), Arc<View>>,
-    sets: Sets,
-    /// Shaders that are built: the first run of an operation is not timed.
+    /// Views drawn in the true light, the latest last.
+    truths: VecDeque<(DirectWork, View)>,
+    /// Sample sets on the device, the latest last: rows differ in quality, and share sets.
+    sets: VecDeque<Sampled>,
+    /// Operations whose shaders are built.
     warm: BTreeSet<String>,
 }
 
-/// A camera's numbers, bit by bit.
-type CameraBits = Vec<u32>;
+#[derive(Clone)]
+struct Sampled {
+    work: SampleWork,
+    set: SharedSet,
+    /// g_s and d.
+    sample_image_s: f64,
+    load_set_s: f64,
+}
+
+/// What views are made from.
+enum Source {
+    Scene(Box<Workload>),
+    Set { set: SharedSet, method: String },
+}
 
 impl Prober {
-    /// A prober of a subject whose scene is loaded.
-    #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, subject: Subject, turn: Turn) -> Self {
-        let warm = BTreeSet::new();
-        Self { engine, subject, turn, truths: BTreeMap::new(), sets: Sets::default(), warm }
+    pub(crate) fn new(engine: Arc<dyn Engine>, turn: Turn) -> Self {
+        Self { engine, turn, truths: VecDeque::new(), sets: VecDeque::new(), warm: BTreeSet::new() }
     }
 
-    /// The subject.
-    #[must_use]
-    pub fn subject(&self) -> &Subject {
-        &self.subject
-    }
-
-    /// The errors of a representation on some views in a light, and its costs in the light of the session.
-    ///
-    /// # Errors
-    /// The device fails, or refuses the representation.
-    pub fn probe(
+    /// The errors of views of one cell, and the costs of samples and of a view.
+    pub(crate) fn probe(
         &mut self,
-        of: &Representation,
-        light: Light,
+        request: &MeasureCosts,
+        budget: &BudgetMeasurement,
+        workload: &Workload,
         cameras: &[PinholeCamera],
-    ) -> Result<(Vec<ViewErrors>, RowCosts), ProbeError> {
-        let truths = self.truths(light, cameras)?;
-        let measured = self.measure(of, light, cameras, self.subject.planes)?;
-        let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
-        let errors = pairs
-            .into_par_iter()
-            .map(|((camera, truth), made)| view_errors(camera, truth, made, &measured.sample_images, None));
-        let errors = errors.collect::<Result<_, _>>()?;
-        let sample_image_s = self.sample_image_s(of, light, measured.costs.sample_image_s)?;
-        Ok((errors, RowCosts { sample_image_s, ..measured.costs }))
+    ) -> Result<(Vec<ViewErrors>, Costs), Status> {
+        let planes = ViewPlanes { antialias: request.planes.antialias, ..ViewPlanes::COLOR };
+        let mut costs = Costs::default();
+        let source = if request.method == DIRECT {
+            Source::Scene(Box::new(workload.clone()))
+        } else {
+            let sampled = self.sampled(request, workload)?;
+            (costs.sample_image_s, costs.load_set_s) = (sampled.sample_image_s, sampled.load_set_s);
+            Source::Set { set: sampled.set, method: request.method.clone() }
+        };
+        self.warm_up(&source, &cameras[..1], planes)?;
+        let (views, views_s) = self.timed(|prober| prober.made(&source, cameras, planes))?;
+        costs.reconstruct_view_s = views_s / cameras.len() as f64;
+        let truth = Workload { lighting: budget.truth_lighting.clone(), ..workload.clone() };
+        let truths = self.truths(truth, cameras, planes)?;
+        let compared: Vec<_> = cameras.iter().zip(&truths).zip(&views).collect();
+        let errors = compared.into_par_iter().map(|((camera, truth), view)| view_errors(camera, truth, view, None));
+        let errors: Result<Vec<ViewErrors>, _> = errors.collect();
+        Ok((errors.map_err(internal)?, costs))
     }
 
-    /// Views of a representation in a light with some planes, and its costs in that light with these planes.
-    ///
-    /// # Errors
-    /// As [`Prober::probe`].
-    pub fn measure(
-        &mut self,
-        of: &Representation,
-        light: Light,
-        cameras: &[PinholeCamera],
-        planes: ViewPlanes,
-    ) -> Result<Measured, ProbeError> {
-        let sampled = self.sampled(of, light)?;
-        let images = &sampled.images[..of.sample_cameras.len()];
-        let (set, load_set_s, view_s) = self.loaded(of, light, planes, images, &cameras[..1])?;
-        let views_a_call = views_of(CALL_S, view_s, usize::MAX);
+    /// Views drawn in the true light, which are kept.
+    fn truths(&mut self, truth: Workload, cameras: &[PinholeCamera], planes: ViewPlanes) -> Result<Vec<View>, Status> {
+        let planes = ViewPlanes { inverse_depth: true, ..planes };
+        let source = Source::Scene(Box::new(truth.clone()));
+        let mut truths = Vec::with_capacity(cameras.len());
+        for camera in cameras {
+            let work = DirectWork::of(&truth, vec![*camera], planes);
+            let known = self.truths.iter().find(|(other, _)| *other == work).map(|(_, view)| view.clone());
+            let view =
+                known.map_or_else(|| Ok(self.made(&source, &work.cameras, planes)?.remove(0)), Ok::<_, Status>)?;
+            push_latest(&mut self.truths, (work, view.clone()), MOST_TRUTHS);
+            truths.push(view);
+        }
+        Ok(truths)
+    }
+
+    fn made(&self, source: &Source, cameras: &[PinholeCamera], planes: ViewPlanes) -> Result<Vec<View>, Status> {
         let mut views = Vec::with_capacity(cameras.len());
-        let mut seconds = 0.0;
-        let timed = timed_cameras(cameras, views_a_call);
-        for cameras in timed.chunks(views_a_call) {
-            let work = ViewWork { cameras: cameras.to_vec(), method: of.method.clone(), planes };
-            let (made, call_s) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
-            seconds += call_s;
-            views.extend(made);
+        for cameras in cameras.chunks(VIEWS_A_CALL) {
+            views.extend(match source {
+                Source::Scene(workload) => {
+                    self.engine.draw_direct(&DirectWork::of(workload, cameras.to_vec(), planes), self.turn)?
+                }
+                Source::Set { set, method } => {
+                    let work = ViewWork { cameras: cameras.to_vec(), method: method.clone(), planes };
+                    self.engine.reconstruct(set.as_ref(), &work, self.turn)?
+                }
+            });
         }
-        let reconstruct_view_s = seconds / views.len().max(1) as f64;
-        views.truncate(cameras.len());
-        Ok(Measured {
-            views,
-            sample_images: images.to_vec(),
-            set_bytes: sampled.encoded_bytes[..images.len()].iter().sum(),
-            costs: RowCosts { sample_image_s: sampled.sample_image_s, load_set_s, reconstruct_view_s },
-        })
+        match views.len() == cameras.len() {
+            true => Ok(views),
+            false => Err(internal("the device has not made all views")),
+        }
     }
 
-    /// The costs of a representation in the light of the session. Nothing is kept from earlier measurements.
-    ///
-    /// # Errors
-    /// As [`Prober::probe`].
-    pub fn time(&mut self, of: &Representation, cameras: &[PinholeCamera]) -> Result<RowCosts, ProbeError> {
-        self.sets = Sets::default();
-        Ok(self.measure(of, Light::Session, cameras, self.subject.planes)?.costs)
+    /// Builds what the first view needs, so that it is not timed: shaders, and buffers of a set.
+    fn warm_up(&mut self, source: &Source, first: &[PinholeCamera], planes: ViewPlanes) -> Result<(), Status> {
+        let (name, is_new_set) = match source {
+            Source::Scene(workload) => (format!("{} {planes:?}", workload.lighting), false),
+            Source::Set { set, method } => {
+                let set = format!("{:?}", Arc::as_ptr(set).cast::<()>());
+                (format!("{method} {planes:?}"), self.warm.insert(set))
+            }
+        };
+        if self.warm.insert(name) && !is_new_set {
+            self.made(source, &[first[0].resized(SMALL_PX)], planes)?;
+        }
+        if is_new_set {
+            self.made(source, first, planes)?;
+        }
+        Ok(())
     }
 
-    /// The same views drawn from the scene, with depth.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn truths(&mut self, light: Light, cameras: &[PinholeCamera]) -> Result<Vec<Arc<View>>, ProbeError> {
-        let light = self.same_light(light);
-        let keys: Vec<_> = cameras.iter().map(|camera| (light, bits(camera))).collect();
-        let mut missing: BTreeMap<_, _> = keys.iter().cloned().zip(cameras.iter().copied()).collect();
-        missing.retain(|key, _| !self.truths.contains_key(key));
-        let kept_pixels = self.truths.values().map(|view| view.size_px.element_product() as usize);
-        let pixels: usize = kept_pixels.chain(missing.values().map(PinholeCamera::pixel_count)).sum();
-        if pixels * TRUTH_BYTES_PER_PIXEL > MAX_TRUTH_BYTES {
-            self.truths.retain(|key, _| keys.contains(key));
+    /// The sample set of a workload of one cell on the device, as it was kept or anew. Its images are encoded and decoded, as
+    /// those of samplers are.
+    fn sampled(&mut self, request: &MeasureCosts, workload: &Workload) -> Result<Sampled, Status> {
+        let planes = self.engine.sample_planes(&request.method)?;
+        let workload = Workload { planes, ..workload.clone() };
+        let work = SampleWork::of(&workload);
+        if let Some(known) = self.sets.iter().find(|sampled| sampled.work == work) {
+            return Ok(known.clone());
         }
-        let (missing, cameras): (Vec<_>, Vec<_>) = missing.into_iter().unzip();
-        let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
-        for (keys, cameras) in missing.chunks(TRUTHS_A_CALL).zip(cameras.chunks(TRUTHS_A_CALL)) {
-            let work = self.subject.direct_work(cameras.to_vec(), light, planes);
-            let drawn = self.engine.draw_direct(&work, self.turn)?;
-            self.truths.extend(keys.iter().cloned().zip(drawn.into_iter().map(Arc::new)));
+        if self.warm.insert(format!("{} {planes:?}", work.sampling)) {
+            let cameras = work.cameras.iter().map(|camera| camera.resized(SMALL_PX)).collect();
+            self.engine.sample(&SampleWork { cameras, ..work.clone() }, self.turn)?;
         }
-        Ok(keys.iter().map(|key| self.truths[key].clone()).collect())
-    }
-
-    /// The costs of drawing views directly in the light of the session, and of encoding them.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn direct_costs(&mut self, viewpoints: &Viewpoints, codec: FrameCodec) -> Result<DirectCosts, ProbeError> {
-        let planes = self.subject.planes;
-        let alone = self.subject.direct_work(viewpoints.first(1), Light::Session, planes);
-        let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&alone, turn))?;
-        let batch = viewpoints.first(views_of(CALL_S, alone_s, TIMED_VIEWS));
-        let batch = self.subject.direct_work(batch, Light::Session, planes);
-        let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
-        let (encoded, encode_s) =
-            own_time(self.engine.as_ref(), || drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
-        encoded?;
-        let views = drawn.len().max(1) as f64;
-        Ok(DirectCosts { direct_view_s: direct_s / views, encode_view_s: encode_s / views })
-    }
-
-    /// The median time of some runs after a warm-up, in which shaders are built.
-    fn median_s<T>(&self, run: impl Fn(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
-        let done = run(self.engine.as_ref(), self.turn)?;
-        let mut seconds = Vec::with_capacity(DIRECT_RUNS);
-        for _ in 0..DIRECT_RUNS {
-            seconds.push(self.timed(&run)?.1);
-        }
-        Ok((done, median(seconds)))
-    }
-
-    /// g_s in the light of the session, from as few images as possible if another light was measured.
-    fn sample_image_s(&mut self, of: &Representation, light: Light, measured_s: f64) -> Result<f64, ProbeError> {
-        if self.same_light(light) == Light::Session {
-            return Ok(measured_s);
-        }
-        let work = self.fewest(self.subject.sample_work(self.engine.as_ref(), of, Light::Session)?)?;
-        Ok(self.encoded(&work)?.1)
-    }
-
-    /// Images as they leave a sampler, and g_s.
-    fn encoded(&mut self, work: &SampleWork) -> Result<(Vec<EncodedImage>, f64), ProbeError> {
-        if self.is_first(&format!("sample {} {:?} {}", work.sampling, work.planes, work.lighting)) {
-            self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
-        }
-        let (encoded, seconds) = own_time(self.engine.as_ref(), || {
-            let images = self.engine.sample(work, self.turn)?;
-            let encoded = images.iter().map(encode_sample_image);
-            Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
+        let (encoded, sampled_s) = self.timed(|prober| {
+            let images = prober.engine.sample(&work, prober.turn)?;
+            images.iter().map(|image| encode_sample_image(image).map_err(internal)).collect::<Result<Vec<_>, _>>()
+        })?;
+        let decoded = encoded.iter().zip(&work.cameras).map(|(image, camera)| {
+            decode_sample_image(&image.header, camera, &image.payload, &DecodeLimits::default()).map_err(internal)
         });
-        let encoded = encoded?;
-        let sample_image_s = seconds / encoded.len().max(1) as f64;
-        Ok((encoded, sample_image_s))
-    }
-
-    /// The fewest images of a set that can be sampled alone.
-    fn fewest(&self, work: SampleWork) -> Result<SampleWork, ProbeError> {
-        let is_independent = self.engine.images_are_independent(&work.sampling)?;
-        Ok(if is_independent { SampleWork { wanted: vec![0], ..work } } else { work })
-    }
-
-    /// The set of a representation, at least.
-    fn sampled(&mut self, of: &Representation, light: Light) -> Result<Arc<SampledSet>, ProbeError> {
-        let work = self.subject.sample_work(self.engine.as_ref(), of, light)?;
-        let key = SetKey { sampling: of.sampling.clone(), planes: work.planes, light: self.same_light(light) };
-        let is_independent = self.engine.images_are_independent(&of.sampling)?;
-        if let Some(set) = self.sets.find(&key, &of.sample_cameras, is_independent) {
-            return Ok(set);
+        let set = SampleSet::of(&workload, decoded.collect::<Result<_, _>>()?, false).map_err(internal)?;
+        let (set, load_set_s) = self.timed(|prober| Ok(prober.engine.upload(&set, prober.turn)?))?;
+        let sample_image_s = sampled_s / encoded.len().max(1) as f64;
+        let sampled = Sampled { work, set, sample_image_s, load_set_s };
+        self.sets.push_back(sampled.clone());
+        while self.sets.len() > 1 && self.sets.iter().map(Sampled::texels).sum::<usize>() > MOST_TEXELS {
+            self.sets.pop_front();
         }
-        let (encoded, sample_image_s) = self.encoded(&work)?;
-        let decoded = encoded.iter().zip(&of.sample_cameras).map(|(image, camera)| {
-            decode_depth_image(&image.header, *camera, &image.payload, &DecodeLimits::default())
-        });
-        let set = Arc::new(SampledSet {
-            images: decoded.collect::<Result<_, _>>()?,
-            encoded_bytes: encoded.iter().map(|image| image.payload.len()).collect(),
-            sample_image_s,
-        });
-        self.sets.keep(key, set.clone());
-        Ok(set)
+        Ok(sampled)
     }
 
-    /// The set on the device, and d: its upload, and what its first view costs more than others, such as quads; with the time
-    /// of a view alone.
-    fn loaded(
-        &mut self,
-        of: &Representation,
-        light: Light,
-        planes: ViewPlanes,
-        images: &[DepthImage],
-        first: &[PinholeCamera],
-    ) -> Result<(SharedSet, f64, f64), ProbeError> {
-        let sample_set = self.subject.sample_set(images, light);
-        let one = ViewWork { cameras: first.to_vec(), method: of.method.clone(), planes };
-        if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {
-            let set = self.engine.upload(&sample_set, self.turn)?;
-            self.engine.reconstruct(set.as_ref(), &one, self.turn)?;
-        }
-        let (set, upload_s) = self.timed(|engine, turn| engine.upload(&sample_set, turn))?;
-        let mut view_s = [0.0; 2];
-        for seconds in &mut view_s {
-            *seconds = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &one, turn))?.1;
-        }
-        let [first_s, next_s] = view_s;
-        Ok((set, upload_s + (first_s - next_s).max(0.0), next_s))
-    }
-
-    /// Two lights of one text are one light.
-    fn same_light(&self, light: Light) -> Light {
-        if self.subject.lighting == self.subject.screening_lighting { Light::Session } else { light }
-    }
-
-    fn is_first(&mut self, operation: &str) -> bool {
-        self.warm.insert(operation.to_owned())
-    }
-
-    fn timed<T>(&self, run: impl FnOnce(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
-        let (done, seconds) = own_time(self.engine.as_ref(), || run(self.engine.as_ref(), self.turn));
+    fn timed<T>(&self, run: impl FnOnce(&Self) -> Result<T, Status>) -> Result<(T, f64), Status> {
+        let (done, seconds) = own_time(self.engine.as_ref(), || run(self));
         Ok((done?, seconds))
     }
 }
 
-/// The views that take no longer than `seconds` together, one at least.
-fn views_of(seconds: f64, view_s: f64, most: usize) -> usize {
-    ((seconds / view_s.max(1e-3)) as usize).clamp(1, most)
+impl Sampled {
+    fn texels(&self) -> usize {
+        self.work.cameras.iter().map(SampleCamera::pixel_count).sum()
+    }
 }
 
-/// The cameras, repeated up to the size of a timed batch, or to that of a call where it is smaller.
-fn timed_cameras(cameras: &[PinholeCamera], views_a_call: usize) -> Vec<PinholeCamera> {
-    let pixels = cameras.first().map_or(1, PinholeCamera::pixel_count).max(1);
-    let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).min(views_a_call).max(cameras.len());
-    cameras.iter().copied().cycle().take(count).collect()
-}
-
-fn bits(camera: &PinholeCamera) -> CameraBits {
-    let PinholeCamera { eye_in_world, world_from_camera, focal_px, principal_px, size_px, near_m } = camera;
-    let lens = [focal_px.x, focal_px.y, principal_px.x, principal_px.y, *near_m];
-    let floats = eye_in_world.to_array().into_iter().chain(world_from_camera.to_array()).chain(lens);
-    floats.map(f32::to_bits).chain(size_px.to_array()).collect()
+pub(crate) fn internal(error: impl ToString) -> Status {
+    Status::internal(error.to_string())
 }

@@ -174,6 +174,12 @@ impl Lighting {
         (lighting != *self).then_some(lighting)
     }
 
+    /// With half the rays so many times, at least one each.
+    #[must_use]
+    pub fn with_rays_halved(&self, times: u32) -> Self {
+        self.with_rays(|rays| NonZeroU32::new(rays.get() >> times).unwrap_or(NonZeroU32::MIN))
+    }
+
     /// No more than so many rays of each kind a pixel.
     #[must_use]
     pub fn with_at_most_rays(&self, most: NonZeroU32) -> Self {

@@ -28,7 +28,7 @@ fn bad_audits_are_refused_by_field() {
     assert!(order(&|order| order.time_ratio = 0.6).contains("audit.time_ratio is 0.6"));
     assert!(order(&|order| order.time_ratio = f64::NAN).contains("audit.time_ratio is NaN"));
     assert!(order(&|order| order.planned_pixel_count = 0).contains("audit.planned_pixel_count is 0"));
-    assert!(order(&|order| order.least_apart_m = -1.0).contains("audit.least_apart_m is -1"));
+    assert!(order(&|order| order.truth_lighting.clear()).contains("audit.truth_lighting"));
 }
 
 #[test]
@@ -41,11 +41,13 @@ fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
         batch_count: 1,
         planes: ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR },
         in_background: true,
-        budget: Some(BudgetMeasurement { compared_lighting: (views > 1).then(|| "phong".to_owned()) }),
+        budget: Some(BudgetMeasurement { truth_lighting: "phong".to_owned() }),
     };
     let sent = |probe: MeasureCosts| read::<MeasureCosts, _>(to_message::<proto::MeasureCostsRequest, _>(probe));
     assert_eq!(sent(probe(1)), Ok(probe(1)));
     assert_eq!(sent(probe(MAX_PROBE_VIEWS)), Ok(probe(MAX_PROBE_VIEWS)));
+    let lightless = MeasureCosts { budget: Some(BudgetMeasurement { truth_lighting: String::new() }), ..probe(1) };
+    assert!(sent(lightless).unwrap_err().to_string().contains("truth_lighting"));
     for views in [0, MAX_PROBE_VIEWS + 1] {
         assert!(sent(probe(views)).unwrap_err().to_string().contains("views"));
     }

@@ -102,11 +102,9 @@ pub(super) fn assignment() -> Assignment {
         method: Some("joint_carve:1".to_owned()),
         audit: Some(AuditOrder {
             time_ratio: 0.01,
-            least_apart_m: 0.002,
             antialias: Antialias::of(4).unwrap(),
             planned_pixel_count: 30_000,
-            with_sample_images: true,
-            in_parts: true,
+            truth_lighting: "soft 16".to_owned(),
         }),
     }
 }
@@ -161,10 +159,7 @@ fn promise() -> Promise {
             audited_views: 20,
             covered_views: 5_000,
             uncovered_views: 30,
-            audits_per_s: 0.11,
-            busy_s: 1.5,
             error: Some(ErrorInterval { low: 0.02, mean: 0.03, high: 0.05 }),
-            viewers_above: 1,
         }),
     }
 }
@@ -298,7 +293,7 @@ pub(super) fn session_plan() -> SessionPlan {
 }
 
 pub(super) fn probed_view() -> ViewErrors {
-    ViewErrors { foreground_ratio: 0.5, flip: 0.1, flip_whole: 0.05, mean_square: 0.01, disoccluded_ratio: 0.02 }
+    ViewErrors { foreground_ratio: 0.5, flip: 0.1, mean_square: 0.01 }
 }
 
 pub(super) fn work_report() -> WorkReport {

@@ -14,10 +14,10 @@ use crate::statistics::geometric_mean;
 /// Compares the fronts of two reports by BD-time: the mean ratio of costs at equal FLIP of the foreground.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  myriorama-lab study fronts --quick --out old       of one version of the program, and likewise `new` of another
+  myriorama-lab study planner --quick --out old       of one version of the program, and likewise `new` of another
   myriorama-lab study compare old/report.json new/report.json")]
 pub struct CompareArgs {
-    /// The report of `study fronts` to compare with
+    /// The report of `study planner` to compare with
     #[arg(value_name = "OLD")]
     old: PathBuf,
     /// The report that is compared

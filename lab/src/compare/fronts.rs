@@ -1,4 +1,4 @@
-//! The rows of a report of `myriorama-lab study fronts`.
+//! The rows of a report of `myriorama-lab study planner`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use anyhow::{Context as _, ensure};
 use app_core::exit::BadInput;
 use report::{Cell, Point, Report, Table};
 
-use crate::fronts::report::{COST, FOREGROUND_FLIP, RECONSTRUCTION, ROWS};
+use crate::budgets::report::{COST, FOREGROUND_FLIP, RECONSTRUCTION, ROWS};
 
 /// The most bytes of a report.
 const MAX_BYTES: u64 = 64 << 20;
@@ -36,7 +36,7 @@ fn subjects(path: &Path) -> anyhow::Result<BTreeMap<String, Methods>> {
             subjects.insert(name.to_owned(), methods(table)?);
         }
     }
-    ensure!(!subjects.is_empty(), "no table of rows: it is no report of `study fronts`");
+    ensure!(!subjects.is_empty(), "no table of rows: it is no report of `study planner`");
     Ok(subjects)
 }
 

@@ -3,7 +3,8 @@
 //! `study light_cache`, `study fronts` and `study sampling` measure the same rows on the same kinds of subject.
 
 mod direct;
-pub mod fronts;
+mod fronts;
+pub mod fronts_command;
 pub mod light;
 pub mod light_cache;
 mod measure;

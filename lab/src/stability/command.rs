@@ -4,16 +4,16 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
+use app_core::experiment::VIEW_SIZE_PX;
 use clap::Args;
-use depth_image::Antialias;
 use engine::GpuEngine;
 use report::{Bar, Check};
 
 use super::measure::{Measured, Stand};
 use super::paths::{PATHS, Path, PathKind};
 use super::report::add_to;
-use super::still::differing_rows;
-use crate::fronts::subject::{Conditions, Subject};
+use super::still::differing_methods;
+use super::subject::Subject;
 use crate::study::{RunArgs, measure_rows};
 
 /// Frames of a path, in the quick form and in the full one.
@@ -57,16 +57,15 @@ pub fn run(args: &StabilityArgs) -> anyhow::Result<Outcome> {
 }
 
 fn measured(engine: &Arc<GpuEngine>, kind: PathKind, frames: usize) -> anyhow::Result<Measured> {
-    let conditions = Conditions { lighting: kind.lighting, ..Conditions::of_scene(kind.scene) };
-    let planning = Subject::load(engine, &conditions)?.planning(Antialias::NONE)?;
-    let stand = Stand { engine: engine.as_ref(), subject: &planning.subject };
-    stand.measure(Path::new(kind, &planning, frames)?)
+    let subject = Subject::load(engine, kind.scene, kind.lighting, VIEW_SIZE_PX)?;
+    let stand = Stand { engine: engine.as_ref(), subject: &subject };
+    stand.measure(Path::new(kind, &subject, frames)?)
 }
 
 fn still(engine: &Arc<GpuEngine>) -> anyhow::Result<Check> {
-    let planning = Subject::load(engine, &Conditions::of_scene(STILL_SCENE))?.planning(Antialias::NONE)?;
-    let stand = Stand { engine: engine.as_ref(), subject: &planning.subject };
-    let (differing, count) = differing_rows(&stand, &planning)?;
-    let name = format!("still camera, still scene: rows of {count} that differ {}", differing.join("; "));
+    let subject = Subject::load(engine, STILL_SCENE, "phong", VIEW_SIZE_PX)?;
+    let stand = Stand { engine: engine.as_ref(), subject: &subject };
+    let (differing, count) = differing_methods(&stand)?;
+    let name = format!("still camera, still scene: methods of {count} that differ {}", differing.join("; "));
     Ok(Check::new(name.trim_end(), differing.len() as f64, "", Bar::AtMost(0.0)))
 }

@@ -1,12 +1,13 @@
 //! The frames of a path on a device.
 
-use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
-use node::{DirectWork, Engine, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
-use probe::{Light, Representation, Subject};
+use cluster::Workload;
+use depth_image::{PinholeCamera, View, ViewPlanes};
+use node::{DirectWork, Engine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use rayon::prelude::*;
 
 use super::figures::{Compared, Figures};
 use super::paths::{Path, SetOfPath};
+use super::subject::{Representation, Subject};
 
 /// The device, and a scene that it has loaded.
 pub struct Stand<'a> {
@@ -35,9 +36,9 @@ impl Stand<'_> {
             // Frames of a set follow one another.
             let frames = path.frames.iter().filter(|frame| frame.set == place);
             let cameras: Vec<PinholeCamera> = frames.map(|frame| frame.camera).collect();
-            let uploaded = self.upload(&self.sample(set)?)?;
+            let uploaded = self.upload(set)?;
             views.extend(self.views(uploaded.as_ref(), &set.representation, cameras.clone())?);
-            truths.extend(self.truths(cameras, set.time_s)?);
+            truths.extend(self.truths(set, cameras)?);
         }
         let compared: Vec<Compared<'_>> =
             truths.iter().zip(&views).map(|(truth, view)| Compared { truth, view }).collect();
@@ -45,15 +46,14 @@ impl Stand<'_> {
         Ok(Measured { path, figures })
     }
 
-    /// The images of a set.
-    pub fn sample(&self, set: &SetOfPath) -> anyhow::Result<Vec<DepthImage>> {
-        let finished = self.subject.sample_work(self.engine, &set.representation, Light::Session)?;
-        let work = SampleWork { scene_time_s: set.time_s, refinement: set.refinement, ..finished };
-        Ok(SampleImage::depth_images(self.engine.sample(&work, Self::TURN)?)?)
-    }
-
-    pub fn upload(&self, images: &[DepthImage]) -> anyhow::Result<SharedSet> {
-        Ok(self.engine.upload(&self.subject.sample_set(images, Light::Session), Self::TURN)?)
+    /// A set on the device.
+    pub fn upload(&self, set: &SetOfPath) -> anyhow::Result<SharedSet> {
+        let workload = self.subject.workload(&set.representation);
+        let planes = self.engine.sample_planes(&set.representation.method.to_string())?;
+        let workload = Workload { planes, ..workload };
+        let work = SampleWork { scene_time_s: set.time_s, refinement: set.refinement, ..SampleWork::of(&workload) };
+        let images = self.engine.sample(&work, Self::TURN)?;
+        Ok(self.engine.upload(&SampleSet::of(&workload, images, false)?, Self::TURN)?)
     }
 
     pub fn views(
@@ -62,13 +62,13 @@ impl Stand<'_> {
         of: &Representation,
         cameras: Vec<PinholeCamera>,
     ) -> anyhow::Result<Vec<View>> {
-        let work = ViewWork { cameras, method: of.method.clone(), planes: self.subject.planes };
+        let work = ViewWork { cameras, method: of.method.to_string(), planes: ViewPlanes::COLOR };
         Ok(self.engine.reconstruct(set, &work, Self::TURN)?)
     }
 
-    fn truths(&self, cameras: Vec<PinholeCamera>, scene_time_s: f32) -> anyhow::Result<Vec<View>> {
-        let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
-        let work = DirectWork { scene_time_s, ..self.subject.direct_work(cameras, Light::Session, planes) };
-        Ok(self.engine.draw_direct(&work, Self::TURN)?)
+    fn truths(&self, set: &SetOfPath, cameras: Vec<PinholeCamera>) -> anyhow::Result<Vec<View>> {
+        let workload = self.subject.workload(&set.representation);
+        let work = DirectWork::of(&workload, cameras, ViewPlanes::WITH_DEPTH);
+        Ok(self.engine.draw_direct(&DirectWork { scene_time_s: set.time_s, ..work }, Self::TURN)?)
     }
 }

@@ -6,5 +6,6 @@ mod measure;
 mod paths;
 mod report;
 mod still;
+mod subject;
 #[cfg(test)]
 mod tests;

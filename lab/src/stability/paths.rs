@@ -1,14 +1,12 @@
 //! Paths of a camera, with the sample set that each frame is made of.
 
 use anyhow::Context as _;
-use app_core::planning::Planning;
 use cluster::Refinement;
-use depth_image::{Camera, PinholeCamera, ViewGroup, nearest_set};
-use glam::{UVec2, Vec2};
-use probe::Representation;
+use depth_image::{PinholeCamera, ViewGroup, nearest_set};
+use glam::Vec2;
 use render::Lighting;
 
-use crate::fronts::subject::default_place;
+use super::subject::{Representation, Subject};
 
 /// The orbits' radius, as a share of the view cell.
 const RADIUS: f32 = 0.8;
@@ -90,9 +88,9 @@ impl Path {
     /// `count` frames of a path on its subject.
     ///
     /// # Errors
-    /// The ladder lacks a representation, or the scene has no cells.
-    pub fn new(kind: PathKind, planning: &Planning, count: usize) -> anyhow::Result<Self> {
-        let usual = planning.representations[default_place(&planning.ladder, CAMERAS)?].clone();
+    /// The scene has no cells.
+    pub fn new(kind: PathKind, subject: &Subject, count: usize) -> anyhow::Result<Self> {
+        let usual = subject.usual(CAMERAS);
         let still = SetOfPath { representation: usual.clone(), time_s: 0.0, refinement: Refinement::default() };
         let (sets, set_of_frames): (Vec<SetOfPath>, Vec<usize>) = match kind.switch {
             Switch::None => (vec![still], vec![0; count]),
@@ -101,11 +99,11 @@ impl Path {
                 (sets.collect(), (0..count).collect())
             }
             Switch::Cell => {
-                let (sets, frames) = across_cells(planning, &usual, count)?;
+                let (sets, frames) = across_cells(subject, &usual, count)?;
                 return Ok(Self { kind, sets, frames });
             }
             Switch::Representation => {
-                let representation = Representation { method: REPLACEMENT.to_owned(), ..usual };
+                let representation = Representation { method: REPLACEMENT.parse()?, ..usual };
                 let replacement = SetOfPath { representation, ..still.clone() };
                 (vec![still, replacement], (0..count).map(|frame| usize::from(frame >= count / 2)).collect())
             }
@@ -115,7 +113,7 @@ impl Path {
                 (sets.collect(), (0..count).map(|frame| frame.min(steps as usize - 1)).collect())
             }
         };
-        let cameras = orbit(planning, kind.step_px, count).into_iter();
+        let cameras = orbit(subject, kind.step_px, count).into_iter();
         let frames = cameras.zip(set_of_frames).map(|(camera, set)| Frame { camera, set }).collect();
         Ok(Self { kind, sets, frames })
     }
@@ -132,14 +130,14 @@ impl Path {
 }
 
 /// Views on a circle in the cell. Without a step they all stand in its middle.
-fn orbit(planning: &Planning, step_px: f32, count: usize) -> Vec<PinholeCamera> {
-    let cell = &planning.viewpoints.cell;
-    let view_px = planning.viewpoints.view_px;
+fn orbit(subject: &Subject, step_px: f32, count: usize) -> Vec<PinholeCamera> {
+    let cell = &subject.cell;
+    let view_px = subject.view_px;
     let middle = cell.camera_at(Vec2::ZERO, view_px);
     if step_px == 0.0 {
         return vec![middle; count];
     }
-    let distance_m = (planning.subject.volume.center() - middle.eye_in_world).length();
+    let distance_m = (subject.volume().center() - middle.eye_in_world).length();
     let half_m = (cell.camera_at(Vec2::X, view_px).eye_in_world - middle.eye_in_world).length();
     let step = step_px * distance_m / (middle.focal_px.x * RADIUS * half_m);
     (0..count).map(|frame| cell.camera_at(Vec2::from_angle(step * frame as f32) * RADIUS, view_px)).collect()
@@ -147,18 +145,16 @@ fn orbit(planning: &Planning, step_px: f32, count: usize) -> Vec<PinholeCamera> 
 
 /// A walk around the scene, in which view cells follow one another as the coordinator places them.
 fn across_cells(
-    planning: &Planning,
+    subject: &Subject,
     usual: &Representation,
     count: usize,
 ) -> anyhow::Result<(Vec<SetOfPath>, Vec<Frame>)> {
-    let cell = &planning.viewpoints.cell;
-    let volume = &planning.subject.volume;
-    let circle = cell.around(volume.center(), CIRCLE_FRAMES, planning.viewpoints.view_px);
+    let volume = subject.volume();
+    let circle = subject.cell.around(volume.center(), CIRCLE_FRAMES, subject.view_px);
     let cameras = &circle[..count.min(CIRCLE_FRAMES)];
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, cameras, volume);
-    let sample = usual.sample_cameras.first().context("no sample cameras")?.reference();
-    let size_px: UVec2 = sample.size_px;
+    let size_px = usual.cameras.first().context("no sample cameras")?.size_px;
     let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
     let of_frames: Option<Vec<usize>> =
         cameras.iter().map(|camera| nearest_set(camera, cells.clone(), volume)).collect();
@@ -168,10 +164,7 @@ fn across_cells(
     let set_of_frames = visits.iter().enumerate().flat_map(|(set, visit)| std::iter::repeat_n(set, visit.len()));
     let frames = cameras.iter().zip(set_of_frames).map(|(&camera, set)| Frame { camera, set });
     let sets = visits.iter().map(|visit| SetOfPath {
-        representation: Representation {
-            sample_cameras: cells[visit[0]].iter().copied().map(Camera::Pinhole).collect(),
-            ..usual.clone()
-        },
+        representation: Representation { cameras: cells[visit[0]].clone(), ..usual.clone() },
         time_s: 0.0,
         refinement: Refinement::default(),
     });

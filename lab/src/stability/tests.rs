@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use app_core::planning::Planning;
-use depth_image::Antialias;
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
@@ -14,15 +12,14 @@ use super::figures::Figures;
 use super::measure::{Measured, Stand};
 use super::paths::{PATHS, Path, PathKind, Switch};
 use super::report::add_to;
-use crate::fronts::subject::{Conditions, Subject};
+use super::subject::Subject;
 
 fn kind(switch: Switch) -> PathKind {
     PATHS.into_iter().find(|kind| kind.switch == switch).unwrap()
 }
 
-fn planning(engine: &Arc<GpuEngine>, scene: &'static str) -> Planning {
-    let conditions = Conditions { size_px: UVec2::new(64, 48), ..Conditions::of_scene(scene) };
-    Subject::load(engine, &conditions).unwrap().planning(Antialias::NONE).unwrap()
+fn blocks(engine: &Arc<GpuEngine>) -> Subject {
+    Subject::load(engine, "blocks", "phong", UVec2::new(64, 48)).unwrap()
 }
 
 fn engine() -> Arc<GpuEngine> {
@@ -31,9 +28,9 @@ fn engine() -> Arc<GpuEngine> {
 
 #[test]
 fn frames_of_a_set_follow_one_another_and_paths_switch_as_they_say() {
-    let planning = planning(&engine(), "blocks");
+    let subject = blocks(&engine());
     for kind in PATHS {
-        let path = Path::new(kind, &planning, 24).unwrap();
+        let path = Path::new(kind, &subject, 24).unwrap();
         let switches = (0..24).filter(|&frame| path.is_switch(frame)).count();
         assert_eq!((path.frames.len(), switches + 1), (24, path.sets.len()), "{}", kind.name);
         let expected = match kind.switch {
@@ -52,9 +49,9 @@ fn frames_of_a_set_follow_one_another_and_paths_switch_as_they_say() {
 #[test]
 fn a_still_path_has_no_error_of_changes_and_a_moving_one_has() {
     let engine = engine();
-    let planning = planning(&engine, "blocks");
-    let stand = Stand { engine: engine.as_ref(), subject: &planning.subject };
-    let path = Path::new(kind(Switch::None), &planning, 3).unwrap();
+    let subject = blocks(&engine);
+    let stand = Stand { engine: engine.as_ref(), subject: &subject };
+    let path = Path::new(kind(Switch::None), &subject, 3).unwrap();
     let still = Path { frames: vec![path.frames[0]; 3], sets: path.sets.clone(), kind: path.kind };
     let still = stand.measure(still).unwrap();
     assert_eq!(still.figures.len(), 2);
@@ -71,9 +68,9 @@ fn a_still_path_has_no_error_of_changes_and_a_moving_one_has() {
 /// The figures are made up.
 #[test]
 fn a_jump_is_the_worst_switch_over_the_median_of_other_changes() {
-    let planning = planning(&engine(), "blocks");
+    let subject = blocks(&engine());
     let jump = |at_switch: f64| {
-        let path = Path::new(kind(Switch::Cell), &planning, 12).unwrap();
+        let path = Path::new(kind(Switch::Cell), &subject, 12).unwrap();
         let change_error = |frame: usize| if path.is_switch(frame) { at_switch } else { 0.02 };
         let figures = (1..12).map(|frame| Figures { flip: 0.1, change_error: change_error(frame) }).collect();
         Measured { path, figures }.jump().unwrap()

@@ -1,38 +1,32 @@
-//! `myriorama plan`: the cheapest representation of a scene that keeps an error budget.
-
-mod output;
+//! `myriorama plan`: the cheapest way to make the views of a scene that keeps a budget.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::Context as _;
 use app_core::exit::Outcome;
-use app_core::planning::{PlannedViews, Planning, one_node};
+use app_core::planning::{PlannedViews, measure};
 use app_core::print_line;
-use app_core::setup::{DeviceArgs, SceneArgs, Setup};
-use app_core::sizes::{SizePx, within};
+use app_core::setup::{DeviceArgs, SceneArgs};
+use app_core::sizes::SizePx;
 use clap::Args;
-use codec::FrameCodec;
-use coordinator::PlanStore as _;
-use coordinator::schedule::STILL_SET_S;
-use depth_image::{Antialias, ViewPlanes};
+use coordinator::schedule::BudgetPlan;
+use depth_image::{Antialias, ViewCell};
 use engine::GpuEngine;
+use glam::Vec2;
 use indicatif::ProgressBar;
-use node::{Engine as _, Turn, WorkClass};
-use output::Output;
-use planner::{Budget, Kept, Planner, Pricing as _, PromiseState, device_name};
-use probe::Prober;
+use planner::{Budget, Demand, Metric, Row, RowSummary};
+use probe::Probers;
+use reconstruction::ReconstructionMethod;
+use report::{Axis, Limit, Point, Series, Table, XyChart};
 
-use crate::serving::PlansArgs;
-
-/// Finds the cheapest representation of a scene that keeps a budget: how it is sampled, from how many cameras, in images of
-/// which size, and how views are reconstructed. Prints the choice, the reason, the front of cost against error, and the
-/// flags that repeat it. Writes rows.csv and samples.json, the sample cameras in the transforms.json convention, to --out.
-/// docs/planner.md says what is promised.
+/// Finds the cheapest way to make views of a scene that keeps a budget: shared light of some quality from some samples, views
+/// from samples alone, or direct drawing with all rays or fewer. Prints the front of cost against error, the choice and the
+/// reason. docs/planner.md says what is promised.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct PlanArgs {
-    /// The most error, and the most time of a view: METRIC [p95] LIMIT, time LIMIT, or both with a comma between. Metrics
-    /// are flip, flip whole, psnr and disocclusion; with p95 the limit is on 95 views in 100, otherwise on the mean
+    /// The most error of views in the mean, over the pixels that show a surface: "flip LIMIT" or "psnr DB"
     #[arg(long, value_name = "BUDGET")]
     budget: Budget,
     #[command(flatten)]
@@ -40,88 +34,157 @@ pub struct PlanArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Size of the views
-    #[arg(long, default_value = "200x150", value_name = "WxH")]
+    #[arg(long, default_value = "640x360", value_name = "WxH")]
     size: SizePx,
     /// Samples a pixel of the views: 1, 2, 4, 8 or 16
     #[arg(long, default_value = "4", value_name = "N")]
     antialias: Antialias,
-    /// The codec of frames, whose time counts: lz4 or png (lossless), or jpeg:QUALITY
-    #[arg(long, default_value = "lz4", value_name = "NAME")]
-    codec: FrameCodec,
-    /// Views of a sample set, which share its cost
+    /// Views that share a sample set: of a moving viewer those of a minute
     #[arg(long, default_value_t = 290, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     views: u32,
-    /// Poses a second of a moving viewer, in place of --views: a set of a still scene serves 60 s of them
-    #[arg(long, value_name = "HZ", conflicts_with = "views", value_parser = within(0.01..=1000.0))]
-    rate: Option<f64>,
-    /// The most time of measuring
-    #[arg(long, default_value_t = 300.0, value_name = "S", value_parser = within(1.0..=1e6))]
-    allowance: f64,
-    #[command(flatten)]
-    plans: PlansArgs,
-    /// The folder of samples.json and rows.csv
-    #[arg(long, default_value = "out/plan", value_name = "DIR")]
-    out: PathBuf,
+    /// Nodes that share the work
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    nodes: u32,
+    /// Draws the rows and their front, as SVG
+    #[arg(long, value_name = "FILE.svg")]
+    chart: Option<PathBuf>,
 }
 
 const EXAMPLES: &str = "\
 Examples:
-  myriorama plan --scene urban --budget \"disocclusion 0.5%\"
-  myriorama plan --scene tree-terrain-125k --budget \"flip p95 0.06, time 8ms\"
-  myriorama plan --scene helmet.gltf --budget \"psnr 32\" --rate 30 --method mesh
+  myriorama plan --scene urban --lighting \"soft 16, occlusion 16\" --budget \"flip 0.02\" --chart plan.svg
+  myriorama plan --scene helmet.gltf --lighting \"soft 16\" --budget \"psnr 34\" --views 24 --size 1280x720
 
 Exit status: 0 the budget is kept; 2 arguments or input that cannot be used; 3 nothing keeps the budget, or a failure.";
 
-impl PlanArgs {
-    /// V: the views that share the cost of a set.
-    fn views_a_set(&self, setup: &Setup) -> usize {
-        match self.rate {
-            None => self.views as usize,
-            // Each pose of a moving scene is of another moment.
-            Some(_) if setup.offer.period_s.is_some() => 1,
-            Some(hz) => (hz * STILL_SET_S).ceil() as usize,
-        }
-    }
-}
+/// Series of the chart.
+const SHARED: &str = "shared light";
+const IMAGES: &str = "samples alone";
+const DIRECT: &str = "direct drawing";
+/// The time of a plan is compared with that of so many views.
+const COMPARED_VIEWS: f64 = 24.0;
 
-/// Plans, prints and writes.
+/// Plans, prints and draws.
 ///
 /// # Errors
-/// The scene cannot be used, the device fails, the folder cannot be written, or nothing keeps the budget.
+/// The scene cannot be used, the device fails, the chart cannot be written, or nothing keeps the budget.
 pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
+    args.scene.check_for_budget(args.budget)?;
     let setup = args.scene.load()?;
+    let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
+    let views = PlannedViews {
+        budget: args.budget,
+        typical_view: cell.camera_at(Vec2::ZERO, args.size.0),
+        antialias: args.antialias,
+        lighting: args.scene.lighting,
+        demand: Demand { nodes: args.nodes as usize, cells: 1, views_a_set: args.views as usize },
+        number: 1,
+    };
     let engine = GpuEngine::shared(args.device.device)?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
-    let views = PlannedViews {
-        size_px: args.size.0,
-        planes: ViewPlanes { antialias: args.antialias, ..ViewPlanes::COLOR },
-        codec: args.codec,
-        scene_time_s: 0.0,
-        seed: 0,
-    };
-    let planning = Planning::new(&setup, &args.scene, &views)?;
-    let mut prober = Prober::new(engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch));
-    let direct = prober.direct_costs(&planning.viewpoints, planning.codec)?;
-    let pricing = one_node(args.views_a_set(&setup), direct);
-    let request =
-        planning.request(args.budget, device_name(&engine.device_name()), pricing.views_a_set, args.allowance);
-    let files = args.plans.files();
-    let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
-    let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
+    let mut plan = views.begin(&setup, engine.as_ref())?;
     let progress = ProgressBar::new_spinner();
     progress.enable_steady_tick(Duration::from_millis(200));
-    let Planning { viewpoints, representations, .. } = &planning;
-    let (outcome, kept) = probe::plan(&mut planner, &mut prober, viewpoints, representations, remembered, |planner| {
-        progress.set_message(planner.outcome().reason);
-    });
+    measure(&mut plan, &Probers::new(engine), |plan| {
+        let (spent_s, count) = plan.planner.spent();
+        progress.set_message(format!("{}: {count} measurements in {spent_s:.1} s", args.budget));
+    })?;
     progress.finish_and_clear();
-    if let Some(files) = files {
-        // The plan is made, whether a later one can use what was measured or not.
-        files.write(&kept).unwrap_or_else(|error| eprintln!("warning: measurements are not kept: {error}"));
+    let lines = lines(&plan);
+    print_line!("{}", table(&front(&lines)).to_text());
+    if let Some(path) = &args.chart {
+        let svg = chart(args.budget, &lines).to_svg()?;
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    let output = Output { budget: args.budget, out: &args.out, setup: &setup, planning: &planning, outcome: &outcome };
-    output.write(&planner.summaries(), pricing.direct())?;
-    print_line!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
-    anyhow::ensure!(outcome.state == PromiseState::Kept, "the budget {} is not kept: {}", args.budget, outcome.reason);
+    let outcome = plan.planner.outcome().context("the plan has no end")?;
+    print_line!("\n{}", outcome.reason);
+    let (spent_s, count) = plan.planner.spent();
+    let exact = plan.planner.request().exact.and_then(|exact| plan.planner.summary(exact));
+    let ratio = exact.map_or(f64::NAN, |exact| spent_s / (COMPARED_VIEWS * exact.price_s));
+    print_line!(
+        "{count} measurements in {spent_s:.1} s, {ratio:.2} times the time of {COMPARED_VIEWS} directly drawn views."
+    );
+    anyhow::ensure!(!outcome.kept.is_empty(), "the budget {} is not kept", args.budget);
     Ok(Outcome::Done)
+}
+
+/// A row that was measured.
+struct Line<'p> {
+    row: &'p Row,
+    summary: RowSummary,
+    error_ratio: f64,
+    /// The same as a person reads it.
+    error: String,
+    is_chosen: bool,
+}
+
+/// All measured rows, the cheapest first.
+fn lines(plan: &BudgetPlan) -> Vec<Line<'_>> {
+    let chosen = plan.planner.outcome().and_then(|outcome| outcome.kept.first().copied());
+    let rows = plan.planner.request().rows.iter().enumerate();
+    let lines = rows.filter_map(|(place, row)| {
+        let summary = plan.planner.summary(place)?;
+        let error_ratio = summary.tested.map(|tested| tested.mean_ratio).or(summary.error_ratio)?;
+        let error = plan.planner.request().budget.shown(error_ratio);
+        Some(Line { row, summary, error_ratio, error, is_chosen: chosen == Some(place) })
+    });
+    let mut lines: Vec<Line<'_>> = lines.collect();
+    lines.sort_by(|a, b| a.summary.price_s.total_cmp(&b.summary.price_s));
+    lines
+}
+
+/// The lines with an error below that of every cheaper one, and the choice.
+fn front<'l, 'p>(by_price: &'l [Line<'p>]) -> Vec<&'l Line<'p>> {
+    let mut least = f64::INFINITY;
+    let lines = by_price.iter().filter(|line| {
+        let is_better = line.error_ratio < least;
+        least = least.min(line.error_ratio);
+        is_better || line.is_chosen
+    });
+    lines.collect()
+}
+
+fn table(front: &[&Line<'_>]) -> Table {
+    Table::of_rows(
+        "Front of cost against error",
+        front,
+        &[
+            ("error", "", |line| line.error.as_str().into()),
+            ("a view", "ms", |line| (line.summary.price_s * 1e3).into()),
+            ("row", "", |line| line.row.to_string().into()),
+            ("", "", |line| if line.is_chosen { "chosen" } else { "" }.into()),
+        ],
+    )
+}
+
+/// Cost against error of all measured rows, with their front, the budget and the choice.
+fn chart(budget: Budget, lines: &[Line<'_>]) -> XyChart {
+    let (name, unit) = match budget.metric() {
+        Metric::Flip => ("FLIP over surfaces", ""),
+        Metric::Psnr => ("mean squared error over surfaces", ""),
+    };
+    let mut chart = XyChart::new(
+        format!("Cost against error, {budget}"),
+        Axis::log("nodes' time for a view", "ms"),
+        Axis::linear(name, unit),
+    );
+    for family in [SHARED, IMAGES, DIRECT] {
+        let own = lines.iter().filter(|line| family_of(line.row) == family);
+        let points =
+            own.map(|line| Point::labelled(line.summary.price_s * 1e3, line.error_ratio, line.row.to_string()));
+        chart = chart.with(Series::points(family, points));
+    }
+    let chosen = lines.iter().filter(|line| line.is_chosen);
+    let chosen = chosen.map(|line| Point::from((line.summary.price_s * 1e3, line.error_ratio)));
+    chart = chart.with(Series::points("chosen", chosen));
+    chart.staircase = front(lines).iter().map(|line| (line.summary.price_s * 1e3, line.error_ratio).into()).collect();
+    chart.limits = vec![Limit { name: budget.to_string(), y: budget.most_ratio() }];
+    chart
+}
+
+fn family_of(row: &Row) -> &'static str {
+    let Row::Samples { method, .. } = row else { return DIRECT };
+    let shares_light = method.parse().is_ok_and(|method: ReconstructionMethod| method.light_cache_quality().is_some());
+    if shares_light { SHARED } else { IMAGES }
 }

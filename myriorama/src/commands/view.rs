@@ -32,7 +32,7 @@ use stopping::{how_to_resume, until};
 use writer::PictureWriter;
 
 /// The longest wait for the choice of a budget.
-const LONGEST_WAIT: Duration = Duration::from_secs(60);
+const LONGEST_WAIT: Duration = Duration::from_secs(600);
 
 /// Asks for views, receives them, and writes them.
 ///

@@ -97,7 +97,9 @@ async fn sessions_that_no_base_suits_have_none() {
         cluster.close(session).await;
     }
     let budget = BudgetRequest { budget: Some("flip 0.1".to_owned()), ..BudgetRequest::default() };
-    let refused = cluster.session(SessionRequest { budget, forced_sampler_count: None, ..asked(Vec::new()) }).await;
+    let policy = PolicyChoice::Auto;
+    let asked = SessionRequest { budget, policy, forced_sampler_count: None, ..asked(Vec::new()) };
+    let refused = cluster.session(asked).await;
     assert!(refused.err().unwrap().to_string().contains("and beside a base"));
 }
 

@@ -57,7 +57,9 @@ async fn sessions_of_direct_views_have_no_blocks_and_budgets_are_refused() {
     assert_eq!(kinds(&session), []);
     cluster.close(session).await;
     let budget = BudgetRequest { budget: Some("flip 0.1".to_owned()), ..BudgetRequest::default() };
-    let asked = SessionRequest { budget, forced_sampler_count: None, follows_mirrors: false, ..asked(Vec::new()) };
+    let policy = PolicyChoice::Auto;
+    let asked =
+        SessionRequest { budget, policy, forced_sampler_count: None, follows_mirrors: false, ..asked(Vec::new()) };
     let refused = cluster.session(asked).await;
     assert!(refused.err().unwrap().to_string().contains("beside a base or blocks"));
 }

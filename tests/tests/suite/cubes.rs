@@ -159,7 +159,8 @@ async fn what_a_cube_does_not_serve_is_refused_by_name() {
     let asked = SessionRequest { volume, ..sampled_as_cube(Vec::new()) };
     assert!(refused(asked).await.contains("volume: "));
     let budget = BudgetRequest { budget: Some("flip 0.1".to_owned()), ..BudgetRequest::default() };
-    let asked = SessionRequest { budget, forced_sampler_count: None, ..sampled_as_cube(Vec::new()) };
+    let policy = PolicyChoice::Auto;
+    let asked = SessionRequest { budget, policy, forced_sampler_count: None, ..sampled_as_cube(Vec::new()) };
     assert!(refused(asked).await.contains("budget: none can be kept for a layered cube"));
 }
 

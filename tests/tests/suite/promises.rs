@@ -6,22 +6,30 @@ use std::time::Duration;
 
 use client::{ClientError, Session};
 use cluster::{BudgetRequest, PolicyChoice, Promise, PromiseState, SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, camera, request, views};
+use cluster_tests::cluster::{Cluster, camera, request, rows, rows_with_direct, views};
+use cluster_tests::scalar_engine::Pace;
 use coordinator::schedule::{Command, Recorder, replay};
-use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers, PlanStore};
+use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers};
 use node::NodeConfig;
 use parking_lot::Mutex;
-use planner::{Certificate, Kept, KeptCosts, KeptKey, KeptRow, RowCosts, ViewErrors};
 
 const DEADLINE: Duration = Duration::from_secs(60);
 /// Every picture keeps this budget, and none but directly drawn ones the other.
 const LOOSE: &str = "flip 0.99";
 const STRICT: &str = "flip 0.00001";
 
-/// A session with a budget. The pipeline is forced: the scalar device draws directly faster than it reconstructs.
+/// A session with a budget.
 fn budgeted(budget: &str) -> SessionRequest {
     let budget = BudgetRequest { budget: Some(budget.to_owned()), ..BudgetRequest::default() };
-    SessionRequest { budget, ..request(PolicyChoice::Pipeline, Timeline::still(0.0)) }
+    SessionRequest { budget, ..request(PolicyChoice::Auto, Timeline::still(0.0)) }
+}
+
+/// Views from samples are faster.
+const SLOW_DRAWING: Pace = Pace { image: Duration::ZERO, view: Duration::ZERO, direct: Duration::from_millis(60) };
+
+/// The configuration of a coordinator that has half of the time for audits.
+fn auditing() -> CoordinatorConfig {
+    CoordinatorConfig { audit_time_ratio: 0.5, rows, ..CoordinatorConfig::default() }
 }
 
 async fn settled(session: &Session) -> Promise {
@@ -56,7 +64,7 @@ async fn a_session_opens_at_once_and_switches_to_the_cheapest_representation_tha
     let promise = settled(&session).await;
     assert_eq!(promise.state, PromiseState::Kept, "{promise}");
     assert!(promise.expected_ratio > 0.0 && promise.expected_ratio <= promise.bound_ratio, "{promise:?}");
-    assert!(promise.bound_ratio <= 0.99 && promise.probe_view_count >= 32, "{promise:?}");
+    assert!(promise.bound_ratio <= 0.99 && promise.probe_view_count >= 16, "{promise:?}");
     let plan = session.another_plan(first.plan_epoch).await.assignment;
     assert_eq!(plan.method.as_deref(), Some("splat"));
     let cameras = plan.workload.sample_cameras.len();
@@ -74,9 +82,9 @@ async fn a_promise_that_nothing_keeps_is_said_to_be_unreachable_and_views_are_ma
     assert_eq!(promise.state, PromiseState::Unreachable, "{promise}");
     assert_eq!(delivered(&session).await, 6);
     // Where views may be drawn directly, they have no error.
-    let free = SessionRequest { policy: PolicyChoice::Auto, ..budgeted(STRICT) };
-    cluster.close(session).await;
-    let session = cluster.session(free).await.unwrap();
+    let config = CoordinatorConfig { rows: rows_with_direct, ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 2, |config| config).await;
+    let session = cluster.session(budgeted(STRICT)).await.unwrap();
     let promise = settled(&session).await;
     assert_eq!(promise.state, PromiseState::Kept, "{promise}");
     assert_eq!(delivered(&session).await, 6);
@@ -85,51 +93,41 @@ async fn a_promise_that_nothing_keeps_is_said_to_be_unreachable_and_views_are_ma
 #[tokio::test(flavor = "multi_thread")]
 async fn a_text_that_is_no_budget_is_refused_by_its_term() {
     let cluster = Cluster::start(1).await;
-    for wrong in ["flop 0.1", "flip NaN", "flip -1", "flip 0.1, flip 0.2", &"flip 1,".repeat(30)] {
+    for wrong in ["flop 0.1", "flip NaN", "flip 0", "flip 0.1, psnr 30", &"flip 1,".repeat(30)] {
         let refused = cluster.session(budgeted(wrong)).await.unwrap_err();
         assert!(matches!(&refused, ClientError::Coordinator { reason } if reason.contains("budget")), "{refused}");
     }
-    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), ..budgeted(LOOSE) };
-    let refused = cluster.session(direct).await.unwrap_err();
-    assert!(refused.to_string().contains("leave no representation"), "{refused}");
+    let named = BudgetRequest { budget: Some(LOOSE.to_owned()), names_method: true };
+    for (request, what) in [
+        (SessionRequest { method: cluster::DIRECT.to_owned(), ..budgeted(LOOSE) }, "method is named"),
+        (SessionRequest { budget: named, ..budgeted(LOOSE) }, "method is named"),
+        (SessionRequest { policy: PolicyChoice::Pipeline, ..budgeted(LOOSE) }, "policy is named"),
+        (SessionRequest { sample_size_px: Some(glam::UVec2::splat(32)), ..budgeted(LOOSE) }, "size of sample images"),
+    ] {
+        let refused = cluster.session(request).await.unwrap_err();
+        assert!(refused.to_string().contains(what), "{refused}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_coordinators_budget_is_that_of_sessions_that_state_none() {
-    let config = CoordinatorConfig { budget: Some(LOOSE.parse().unwrap()), ..CoordinatorConfig::default() };
+    let config = CoordinatorConfig { budget: Some(LOOSE.parse().unwrap()), rows, ..CoordinatorConfig::default() };
     let cluster = Cluster::start_limited(config, 1, |config| config).await;
-    let plain = request(PolicyChoice::Pipeline, Timeline::still(0.0));
+    let plain = request(PolicyChoice::Auto, Timeline::still(0.0));
     let session = cluster.session(plain.clone()).await.unwrap();
     assert_eq!(settled(&session).await.budget, LOOSE);
     // A session that has its views drawn by name has nothing to be promised.
-    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), policy: PolicyChoice::Auto, ..plain };
+    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), ..plain };
     let session = cluster.session(direct).await.unwrap();
     assert_eq!(delivered(&session).await, 6);
     assert_eq!(session.promise(), None);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn measurements_outlive_the_coordinator_and_are_used_again() {
-    let config = CoordinatorConfig { plans: Some(Arc::new(Memory::default())), ..CoordinatorConfig::default() };
-    let mut all = Vec::new();
-    for _ in 0..2 {
-        let log = Shared::default();
-        let cluster = recorded(config.clone(), 1, &log).await;
-        let session = cluster.session(budgeted(LOOSE)).await.unwrap();
-        let promise = settled(&session).await;
-        drop(session);
-        all.push((promise.state, promise.representation, probes(&log)));
-    }
-    let [(first, chosen, measured), (second, again, more)] = &all[..] else { panic!("two coordinators") };
-    assert_eq!((first, chosen), (second, again));
-    assert!(*measured > 0 && *more == 0, "{measured} probes, then {more}");
 }
 
 /// The commands of a log, as the schedule gave them.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_recorded_log_replays_to_the_same_promise() {
     let log = Shared::default();
-    let cluster = recorded(CoordinatorConfig::default(), 2, &log).await;
+    let cluster = recorded(CoordinatorConfig { rows, ..CoordinatorConfig::default() }, 2, &log).await;
     let session = cluster.session(budgeted(LOOSE)).await.unwrap();
     let promise = settled(&session).await;
     let commands = replay(&log.0.lock()[..]).unwrap().into_iter().flat_map(|step| step.commands);
@@ -148,22 +146,6 @@ async fn a_node_that_is_lost_while_it_measures_is_replaced_by_another() {
     let promise = settled(&session).await;
     assert_eq!(promise.state, PromiseState::Kept, "{promise}");
     assert_eq!(delivered(&session).await, 6);
-}
-
-/// Measurements in memory.
-#[derive(Debug, Default)]
-struct Memory(Mutex<Vec<Kept>>);
-
-impl PlanStore for Memory {
-    fn read(&self, key: &KeptKey) -> Kept {
-        let found = self.0.lock().iter().rev().find(|kept| kept.key == *key).cloned();
-        found.unwrap_or_else(|| Kept::empty(key.clone()))
-    }
-
-    fn write(&self, kept: &Kept) -> std::io::Result<()> {
-        self.0.lock().push(kept.clone());
-        Ok(())
-    }
 }
 
 /// A live view goes on while the representation changes.
@@ -189,99 +171,10 @@ fn session_view(step: usize) -> depth_image::PinholeCamera {
     camera(0.1 + 0.01 * step as f32, glam::UVec2::new(48, 36))
 }
 
-/// Measurements as a device that lies has left them: errors are a third of the true ones. Budgets and rows of one and of four
-/// cameras are promised to be kept.
-async fn divided_by_three() -> (Arc<Memory>, String) {
-    let memory = Arc::new(Memory::default());
-    let config = CoordinatorConfig { plans: Some(memory.clone()), ..CoordinatorConfig::default() };
-    let cluster = Cluster::start_limited(config, 1, |config| config).await;
-    let session = cluster.session(budgeted(LOOSE)).await.unwrap();
-    let promise = settled(&session).await;
-    let mut kept = memory.0.lock().pop().expect("measurements");
-    let budget = format!("flip {}", promise.expected_ratio * 0.6);
-    let all = kept.rows.iter().flat_map(|kept| &kept.certificates);
-    let Some(certificate) = all.last().cloned() else { panic!("no certificate of {promise}") };
-    for kept in &mut kept.rows {
-        let screening = kept.screening.iter().map(|errors| ViewErrors { flip: errors.flip / 3.0, ..*errors });
-        let thirds = KeptRow::new(kept.row.clone(), screening.collect());
-        let ratio = promise.expected_ratio / 3.0 / f64::from(kept.row.camera_count).sqrt();
-        let expected_ratio = ratio;
-        let bound_ratio = ratio * 1.1;
-        let budget = budget.parse().unwrap();
-        let certificate = Certificate { budget, expected_ratio, bound_ratio, ..certificate.clone() };
-        // One camera is cheapest, however busy the machine was.
-        let seconds = 1e-3 * f64::from(kept.row.camera_count);
-        let costs = RowCosts { sample_image_s: 1e-3, load_set_s: seconds, reconstruct_view_s: seconds };
-        let costs = kept.costs.iter().map(|of_device| KeptCosts { costs, ..of_device.clone() }).collect();
-        *kept = KeptRow { certificates: vec![certificate], costs, ..thirds };
-    }
-    kept.searches.clear();
-    memory.0.lock().push(kept);
-    (memory, budget)
-}
-
-/// A cluster that audits as often as it may, with wrong measurements of earlier plans, and a session to which too much is
-/// promised.
-async fn promised_too_much() -> (Cluster, Session) {
-    let (memory, budget) = divided_by_three().await;
-    let config = CoordinatorConfig { plans: Some(memory), audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
-    let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
-    let request = SessionRequest { frames_per_s: Some(20.0), views_per_set: 1, ..budgeted(&budget) };
-    let session = cluster.session(request).await.unwrap();
-    let promise = settled(&session).await;
-    assert_eq!(promise.state, PromiseState::Kept, "{promise}");
-    (cluster, session)
-}
-
 #[tokio::test(flavor = "multi_thread")]
-async fn audits_break_a_promise_of_wrong_measurements_and_another_representation_takes_its_place() {
-    let (_cluster, session) = promised_too_much().await;
-    let first = session.promise().unwrap();
-    let mut live = session.live();
-    let mut seen = Vec::new();
-    let start = std::time::Instant::now();
-    for step in 0.. {
-        assert!(start.elapsed() < DEADLINE, "{seen:#?}");
-        live.set_pose(session_view(step % 120), 0).unwrap();
-        tokio::time::timeout(DEADLINE, live.next()).await.expect("a frame").unwrap();
-        let promise = session.promise().unwrap();
-        if seen.last().is_none_or(|last: &Promise| last.state != promise.state) {
-            seen.push(promise.clone());
-        }
-        let is_replaced = promise.state == PromiseState::Kept && promise.representation != first.representation;
-        if is_replaced {
-            break;
-        }
-    }
-    // The state may have passed between two looks.
-    let mut broken = seen.iter().filter(|promise| promise.state == PromiseState::Broken);
-    assert!(broken.all(|promise| promise.reason.contains("Audits found flip")), "{seen:#?}");
-    assert!(session.promise().unwrap().reason.contains("Audits found flip"), "{}", session.promise().unwrap());
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_viewer_that_stays_above_the_budget_is_named_and_breaks_no_promise_of_the_mean() {
-    let (_cluster, session) = promised_too_much().await;
-    let mut live = session.live();
-    let start = std::time::Instant::now();
-    let named = loop {
-        assert!(start.elapsed() < DEADLINE, "{}", session.promise().unwrap());
-        live.set_pose(session_view(60), 0).unwrap();
-        tokio::time::timeout(DEADLINE, live.next()).await.expect("a frame").unwrap();
-        let promise = session.promise().unwrap();
-        assert_eq!(promise.state, PromiseState::Kept, "{promise}");
-        if promise.reason.contains("Broken here (viewer") {
-            break promise;
-        }
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    };
-    assert!(named.audit.unwrap().audited_views <= 2, "it is audited once on each node that serves it: {named}");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn of_large_views_a_square_is_audited() {
-    let config = CoordinatorConfig { audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
-    let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+async fn a_square_of_large_views_is_audited() {
+    let mut cluster = Cluster::start_limited(auditing(), 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+    cluster.keep_pace(SLOW_DRAWING);
     let typical_view = camera(0.5, glam::UVec2::new(360, 270));
     let request = SessionRequest { typical_view, frames_per_s: Some(10.0), views_per_set: 1, ..budgeted(LOOSE) };
     let session = cluster.session(request).await.unwrap();
@@ -294,7 +187,6 @@ async fn of_large_views_a_square_is_audited() {
         assert!(start.elapsed() < DEADLINE, "{promise}");
         assert_eq!(promise.state, PromiseState::Kept, "{promise}");
         if promise.audit.is_some_and(|audit| audit.audited_views >= 3) {
-            assert!(promise.reason.contains("on parts of"), "{promise}");
             return;
         }
         live.set_pose(camera(0.1 + 0.01 * (step % 80) as f32, typical_view.size_px), 0).unwrap();
@@ -304,8 +196,8 @@ async fn of_large_views_a_square_is_audited() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_honest_promise_is_audited_and_stays() {
-    let config = CoordinatorConfig { audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
-    let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+    let mut cluster = Cluster::start_limited(auditing(), 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+    cluster.keep_pace(SLOW_DRAWING);
     let session = cluster.session(budgeted(LOOSE)).await.unwrap();
     settled(&session).await;
     let start = std::time::Instant::now();
@@ -320,7 +212,7 @@ async fn an_honest_promise_is_audited_and_stays() {
             break audit;
         }
     };
-    assert!(audit.covered_views >= 6 && audit.uncovered_views == 0 && audit.busy_s > 0.0, "{audit:?}");
+    assert!(audit.covered_views >= 6 && audit.uncovered_views == 0, "{audit:?}");
 }
 
 /// A log that a test can read.
@@ -341,11 +233,4 @@ async fn recorded(config: CoordinatorConfig, nodes: usize, log: &Shared) -> Clus
     let log = Recorder::new(Box::new(log.clone()) as Box<dyn Write + Send>).unwrap();
     let observers = Observers { metrics: CoordinatorMetrics::default(), log: Some(log) };
     Cluster::start_observed(config, observers, nodes, |config| config).await
-}
-
-/// Measurements that nodes were asked for.
-fn probes(log: &Shared) -> usize {
-    let steps = replay(&log.0.lock()[..]).unwrap();
-    let commands = steps.iter().flat_map(|step| &step.commands);
-    commands.filter(|command| matches!(command, Command::ProbeViews(_))).count()
 }

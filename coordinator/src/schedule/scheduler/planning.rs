@@ -213,7 +213,7 @@ impl Scheduler {
         let members = self.serving(workload).map(|(name, member)| (name.clone(), member.incarnation)).collect();
         let mut assignment = assignment(self.plan_epoch + 1, number, workload.degraded(), choice, &candidates);
         assignment.method = workload.common_method();
-        assignment.audit = workload.audit.filter(|_| assignment.policy != Policy::Direct);
+        assignment.audit = workload.audit.clone().filter(|_| workload.is_audited_under(assignment.policy));
         let old = workload.active_plan.as_ref();
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };

@@ -24,8 +24,10 @@ impl Scheduler {
         }
         let Some(number) = self.workload_for(opening) else { return self.begin(opening) };
         let mut commands = self.change(number, |sessions| sessions.add(opening));
-        let budget = opening.budgeted.as_ref().map(|budgeted| &budgeted.budget);
-        commands.extend(self.promise_to(session, budget, number));
+        let announced = self.workloads.get(&number).and_then(|workload| workload.announced.clone());
+        commands.extend(
+            announced.map(|(_, promise)| Command::Promise { sessions: vec![session], promise: Box::new(promise) }),
+        );
         let is_announced = commands
             .iter()
             .any(|command| matches!(command, Command::Apply { plan, .. } if plan.assignment.workload_number == number));

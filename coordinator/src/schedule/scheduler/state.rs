@@ -43,7 +43,7 @@ impl Scheduler {
             conditions: self.conditions(number, workload),
             achieved: workload.achieved.clone(),
             utilisation: self.utilisation(number).filter(|&utilisation| utilisation > 0.0),
-            promise: self.workload_promise(number),
+            promise: self.promise(number),
             shared_light: workload.sessions.shared_light(),
             one_more_viewer: self.one_more_viewer(number, workload),
         }

@@ -61,10 +61,6 @@ impl Scheduler {
             return Vec::new();
         }
         self.cells_changed_at = Some(self.now);
-        for number in &changed {
-            // Earlier viewpoints are of other cells.
-            self.budgets.get_mut(number).into_iter().for_each(|state| state.findings.poses.clear());
-        }
         changed.into_iter().flat_map(|number| self.replan(number, "sessions look from elsewhere")).collect()
     }
 }

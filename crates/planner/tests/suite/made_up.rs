@@ -1,264 +1,141 @@
-//! A made-up subject: a ladder whose errors and costs are known exactly, and the caller of a planner.
+//! Made-up scenes: errors and costs of rows from a seed.
 
-use planner::{
-    Command, Event, Kept, KeptKey, Ladder, Outcome, PlanRequest, Planner, Price, Pricing, ProbeView, Probed, Purpose,
-    Row, RowCosts, Timed, ViewErrors,
-};
+use planner::{Budget, Demand, PlanRequest, Planner, Probe, Probed, Row, RowCosts, ViewErrors};
 
-use crate::random::Random;
+/// Numbers from a seed (SplitMix64).
+#[derive(Debug, Clone)]
+pub struct Random(pub u64);
 
-/// The number of views that one sample set serves.
-const VIEWS_PER_SET: f64 = 290.0;
+impl Random {
+    /// From 0 to below 1.
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
 
-const SAMPLINGS: [&str; 3] = ["plain", "thrifty", "peeled"];
-const METHODS: [(&str, &str, u32); 6] = [
-    ("search:8", "search", 8),
-    ("search:32", "search", 32),
-    ("carve:2", "carve", 2),
-    ("carve:4", "carve", 4),
-    ("quads", "quads", 1),
-    ("boxes", "boxes", 1),
-];
+    /// Evenly spread over the logarithm.
+    pub fn between(&mut self, least: f64, most: f64) -> f64 {
+        least * (most / least).powf(self.unit())
+    }
 
-/// 3 sampling methods × S of {1, 2, 4, 8} × 3 sides × 6 reconstructions.
-pub fn ladder() -> Ladder {
+    /// A factor with this coefficient of variation, 1 in the mean: the sum of three exponential numbers at 0.58.
+    pub fn factor(&mut self, variation: f64) -> f64 {
+        let gamma: f64 = (0..3).map(|_| -(1.0 - self.unit()).ln() / 3.0).sum();
+        1.0 + (gamma - 1.0) * variation * 3_f64.sqrt()
+    }
+}
+
+/// The 49 rows of expensive light.
+pub fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
-    for sampling in SAMPLINGS {
-        for camera_count in [1, 2, 4, 8] {
-            for side_ratio in [0.5, 0.71, 1.0] {
-                rows.extend(METHODS.map(|(method, kind, rank)| Row {
-                    sampling: sampling.to_owned(),
-                    method: method.to_owned(),
-                    camera_count,
-                    place_count: camera_count,
-                    side_ratio,
-                    kind: format!("{sampling} {kind}"),
-                    rank,
-                }));
-            }
+    for density in [0.25, 0.5, 1.0] {
+        for camera_count in [1, 2, 4] {
+            let methods = ["light:draft", "light:fast", "light", "light:fine"].map(str::to_owned);
+            rows.extend(methods.map(|method| Row::Samples { method, camera_count, density }));
         }
     }
-    Ladder::new(rows).unwrap()
+    for density in [0.5, 1.0] {
+        for camera_count in [1, 4] {
+            let methods = ["carve", "mesh"].map(str::to_owned);
+            rows.extend(methods.map(|method| Row::Samples { method, camera_count, density }));
+        }
+    }
+    let direct = [16, 8, 4, 2, 1]
+        .map(|part| Row::Direct { lighting: format!("soft {}", 16 / part), ray_ratio: 1.0 / f64::from(part) });
+    rows.extend(direct);
+    rows
 }
 
-/// The mean errors and the costs of all rows, and how both vary.
-#[derive(Debug, Clone)]
-pub struct Subject {
-    pub ladder: Ladder,
-    seed: u64,
-    /// Mean FLIP over the foreground of all views; other errors follow from it.
-    pub flip: Vec<f64>,
+/// A made-up scene.
+pub struct Scene {
+    pub rows: Vec<Row>,
+    pub errors: Vec<f64>,
     pub costs: Vec<RowCosts>,
-    /// The coefficient of variation of FLIP between views.
-    pub variation: f64,
-    least_foreground: f64,
-    /// The share of views that show next to nothing.
-    pub empty_share: f64,
-    /// The deviation of the logarithm of a cost from timing to timing.
-    noise: f64,
-    pub direct_s: f64,
+    /// The coefficient of variation of errors between views, and the share of foreground.
+    variation: f64,
+    foreground_ratio: f64,
+    random: Random,
 }
 
-impl Subject {
+impl Scene {
     pub fn new(seed: u64) -> Self {
         let mut random = Random(seed);
-        let ladder = ladder();
-        let variation = random.between(0.05, 0.6);
-        let exponents = [random.between(0.2, 0.7), random.between(0.3, 1.0), random.between(0.0, 0.3)];
-        let base = random.between(0.03, 0.08);
-        let kinds: Vec<f64> = (0..16).map(|_| (0.3 * random.normal()).exp()).collect();
-        let flip = ladder.rows().iter().map(|row| {
-            let effort = f64::from(row.camera_count).powf(-exponents[0]) * row.side_ratio.powf(-exponents[1]);
-            let kind = kinds[hash(&row.kind) % 16] * f64::from(row.rank).powf(-exponents[2]);
-            (base * effort * kind * (0.08 * random.normal()).exp()).min(0.5)
-        });
-        let flip = flip.collect();
-        let costs = costs(&ladder, &mut random);
-        let direct_s = random.between(0.006, 0.06);
-        let least_foreground = random.between(0.05, 0.8);
-        Self { ladder, seed, flip, costs, variation, least_foreground, empty_share: 0.0, noise: 0.03, direct_s }
-    }
-
-    /// The errors of a row on a view: half of the variance is common to all rows.
-    pub fn errors(&self, row: usize, view: ProbeView) -> ViewErrors {
-        let number = match view {
-            ProbeView::Screening(number) => u64::from(number) + (1 << 40),
-            ProbeView::Fresh(number) => number,
-        };
-        let mut common = Random(self.seed ^ number.wrapping_mul(0x2545_f491_4f6c_dd1d));
-        let mut own = Random(common.next() ^ (row as u64) << 32);
-        let share = self.variation / 2.0_f64.sqrt();
-        let is_empty = common.unit() < self.empty_share;
-        let foreground_ratio = if is_empty { 0.005 } else { common.between(self.least_foreground, 1.0) };
-        let flip = (self.flip[row] * common.gamma(share) * own.gamma(share)).min(1.0);
-        ViewErrors {
-            foreground_ratio,
-            flip,
-            flip_whole: flip * foreground_ratio,
-            mean_square: (flip * 0.03).min(1.0),
-            disoccluded_ratio: (flip * 0.1).min(1.0),
+        let rows = rows();
+        let surfaces_s = random.between(0.05, 0.3);
+        let light_s = random.between(0.2, 3.0);
+        let scale = random.between(0.5, 2.0);
+        let unknown_ratio = random.between(0.02, 0.3);
+        let mut errors = Vec::new();
+        let mut costs = Vec::new();
+        for row in &rows {
+            let noise = random.factor(0.08);
+            let cost_noise = random.factor(0.05);
+            let (error, cost) = match row {
+                Row::Direct { ray_ratio, .. } => {
+                    let error = if *ray_ratio == 1.0 { 0.0 } else { 0.03 * ray_ratio.powf(-0.4) };
+                    (error, RowCosts { view_s: surfaces_s + light_s * ray_ratio, ..RowCosts::default() })
+                }
+                Row::Samples { method, camera_count, density } => {
+                    let cameras = f64::from(*camera_count);
+                    let (base, effort, finds_surfaces) = match method.as_str() {
+                        "light:draft" => (0.08, 0.0, false),
+                        "light:fast" => (0.05, 0.2, false),
+                        "light" => (0.025, 0.7, false),
+                        "light:fine" => (0.012, 1.0, false),
+                        _ => (0.1, 0.0, true),
+                    };
+                    let error = base * cameras.powf(-0.2) * density.powf(-0.4);
+                    let unknown_s = light_s * unknown_ratio * effort * cameras.powf(-0.3) * density.powf(-0.4);
+                    let view_s = if finds_surfaces { 0.3 * surfaces_s } else { surfaces_s + unknown_s };
+                    let sample_image_s = density * density * (surfaces_s + light_s);
+                    (error, RowCosts { sample_image_s, load_set_s: 0.01 * density * cameras, view_s })
+                }
+            };
+            errors.push(error * scale * noise);
+            costs.push(RowCosts { view_s: cost.view_s * cost_noise, ..cost });
         }
+        let variation = random.between(0.1, 0.5);
+        let foreground_ratio = random.between(0.2, 1.0);
+        Self { rows, errors, costs, variation, foreground_ratio, random }
     }
 
-    /// The subject with another time of direct drawing.
-    pub fn with_direct(self, direct_s: f64) -> Self {
-        Self { direct_s, ..self }
+    /// A view of a row: whatever is hard for one row is about as hard for the others.
+    fn view(&mut self, row: usize, difficulty: f64) -> ViewErrors {
+        let flip = (self.errors[row] * difficulty * self.random.factor(0.05)).clamp(0.0, 1.0);
+        ViewErrors { foreground_ratio: self.foreground_ratio, flip, mean_square: flip * flip }
     }
 
-    pub fn price(&self, row: usize) -> Price {
-        self.row(&self.ladder.rows()[row], &self.costs[row])
+    /// The answer to a probe.
+    pub fn answer(&mut self, probe: &Probe) -> Probed {
+        let views = probe.views.iter().map(|view| {
+            let place = view.place(probe.id.plan);
+            let mut random = Random((place.cell * 1e15) as u64);
+            let difficulty = random.factor(self.variation);
+            self.view(probe.row, difficulty)
+        });
+        let views: Vec<ViewErrors> = views.collect();
+        let own = self.costs[probe.row];
+        let costs = RowCosts { view_s: own.view_s * self.random.factor(0.05), ..own };
+        Probed { id: probe.id, views, costs, busy_s: own.view_s * probe.views.len() as f64 }
     }
 
-    fn timed(&self, row: usize, place: u64, views: usize) -> RowCosts {
-        let mut random = Random(self.seed.wrapping_add(place << 20) ^ row as u64);
-        let deviation = self.noise / (views as f64 / 16.0).sqrt().max(1.0);
-        let mut noisy = |cost: f64| cost * (deviation * random.normal()).exp();
-        let RowCosts { sample_image_s, load_set_s, reconstruct_view_s } = self.costs[row];
-        RowCosts {
-            sample_image_s: noisy(sample_image_s),
-            load_set_s: noisy(load_set_s),
-            reconstruct_view_s: noisy(reconstruct_view_s),
+    pub fn request(&self, budget: Budget, views_a_set: usize, number: u64) -> PlanRequest {
+        let demand = Demand { nodes: 2, cells: 1, views_a_set };
+        PlanRequest { number, budget, rows: self.rows.clone(), exact: Some(self.rows.len() - 1), demand }
+    }
+
+    /// A plan to its end.
+    pub fn plan(&mut self, budget: Budget, views_a_set: usize, number: u64) -> Planner {
+        let mut planner = Planner::new(self.request(budget, views_a_set, number)).unwrap();
+        while let Some(probe) = planner.next_probe() {
+            planner.answer(&self.answer(&probe)).unwrap();
         }
-    }
-}
-
-impl Pricing for Subject {
-    fn row(&self, row: &Row, costs: &RowCosts) -> Price {
-        let set_s = f64::from(row.camera_count) * costs.sample_image_s + costs.load_set_s;
-        let view_s = costs.reconstruct_view_s + 1e-4;
-        Price { node_s: set_s / VIEWS_PER_SET + view_s, view_s }
+        planner
     }
 
-    fn direct(&self) -> Price {
-        Price { node_s: self.direct_s, view_s: self.direct_s }
+    pub fn price_s(&self, row: usize, views_a_set: usize) -> f64 {
+        Demand { nodes: 2, cells: 1, views_a_set }.price_s(&self.rows[row], &self.costs[row])
     }
-}
-
-/// Products of powers, each row 5 % off.
-fn costs(ladder: &Ladder, random: &mut Random) -> Vec<RowCosts> {
-    let constants: Vec<f64> = (0..16).map(|_| (0.4 * random.normal()).exp()).collect();
-    let powers = [random.between(0.3, 0.7), random.between(0.1, 0.5)];
-    let mut noisy = |cost: f64| cost * (0.05 * random.normal()).exp();
-    let cost = |row: &Row| {
-        let count = f64::from(row.camera_count);
-        let side = row.side_ratio;
-        let sampling = constants[hash(&row.sampling) % 16];
-        let method = constants[hash(&row.method) % 16] * sampling.sqrt();
-        RowCosts {
-            sample_image_s: noisy(0.02 * side * side * sampling),
-            load_set_s: noisy(0.002 * count * side * side * sampling),
-            reconstruct_view_s: noisy(0.004 * count.powf(powers[0]) * side.powf(powers[1]) * method),
-        }
-    };
-    ladder.rows().iter().map(cost).collect()
-}
-
-fn hash(text: &str) -> usize {
-    text.bytes().fold(7_usize, |hash, byte| hash.wrapping_mul(31).wrapping_add(usize::from(byte)))
-}
-
-pub fn key() -> KeptKey {
-    let [scene, cell, lighting, view_size, ladder_version] =
-        ["scene", "cell", "light", "200x150", "1"].map(ToOwned::to_owned);
-    KeptKey { scene, cell, lighting, view_size, ladder_version }
-}
-
-pub fn request(budget: &str, seed: u64) -> PlanRequest {
-    PlanRequest {
-        plan: 1,
-        budget: budget.parse().unwrap(),
-        key: key(),
-        device: "made up".to_owned(),
-        program_version: "1".to_owned(),
-        pricing: "made up".to_owned(),
-        allowance_s: 1e6,
-        most_certified: 8,
-        seed,
-    }
-}
-
-pub fn planner(subject: &Subject, request: PlanRequest) -> Planner<Subject> {
-    Planner::new(request, subject.ladder.clone(), subject.clone()).unwrap()
-}
-
-/// The events and the commands of a plan.
-#[derive(Debug, Clone, Default)]
-pub struct Run {
-    pub events: Vec<Event>,
-    pub commands: Vec<Command>,
-}
-
-impl Run {
-    pub fn outcome(&self) -> Outcome {
-        let concluded = self.commands.iter().find_map(|command| match command {
-            Command::Conclude(outcome) => Some((**outcome).clone()),
-            _ => None,
-        });
-        concluded.expect("an outcome")
-    }
-
-    pub fn kept(&self) -> Kept {
-        let kept = self.commands.iter().find_map(|command| match command {
-            Command::Keep(kept) => Some((**kept).clone()),
-            _ => None,
-        });
-        kept.expect("kept measurements")
-    }
-
-    /// Rows and views that were measured for a purpose.
-    pub fn probed(&self, of: Purpose) -> Vec<(usize, Vec<ProbeView>)> {
-        let probes = self.commands.iter().filter_map(|command| match command {
-            Command::Probe { row, views, purpose, .. } if *purpose == of => Some((*row, views.clone())),
-            _ => None,
-        });
-        probes.collect()
-    }
-}
-
-/// The answer to a command; `None` where it asks for nothing.
-pub fn answer(subject: &Subject, command: &Command) -> Option<Event> {
-    match command {
-        Command::Probe { id, row, views, .. } => Some(Event::Probed(Probed {
-            id: *id,
-            row: *row,
-            views: views.iter().map(|&view| (view, subject.errors(*row, view))).collect(),
-            costs: subject.timed(*row, id.number, views.len()),
-            busy_s: views.len() as f64 * (subject.price(*row).view_s + 0.01),
-        })),
-        Command::Time { id, rows, view_count, repeats } => Some(Event::Timed(Timed {
-            id: *id,
-            rows: rows.iter().map(|&row| (row, subject.timed(row, id.number, view_count * repeats))).collect(),
-            busy_s: rows.len() as f64 * 0.5,
-        })),
-        Command::Keep(_) | Command::Conclude(_) => None,
-        Command::Refuse(error) => panic!("{error}"),
-    }
-}
-
-/// The nodes' time that an answer names, in s.
-pub fn busy_s(event: &Event) -> f64 {
-    match event {
-        Event::Probed(probed) => probed.busy_s,
-        Event::Timed(timed) => timed.busy_s,
-        _ => 0.0,
-    }
-}
-
-/// Executes a plan to its end.
-pub fn run(planner: &mut Planner<Subject>, subject: &Subject, kept: Kept) -> Run {
-    let mut run = Run::default();
-    let mut next = Some(Event::Remembered(kept));
-    while let Some(event) = next.take() {
-        run.events.push(event.clone());
-        let commands = planner.step(event);
-        next = commands.iter().find_map(|command| answer(subject, command));
-        run.commands.extend(commands);
-        assert!(run.commands.len() < 5_000, "the plan ends");
-    }
-    run
-}
-
-/// A plan with nothing kept.
-pub fn plan(subject: &Subject, budget: &str, seed: u64) -> Run {
-    run(&mut planner(subject, request(budget, seed)), subject, Kept::empty(key()))
 }

@@ -1,16 +1,7 @@
-//! The planner through its public interface: against a made-up ladder, on streams of made-up errors, and with damaged input.
-
-#![allow(clippy::unwrap_used)]
+//! The planner against made-up scenes, and the alarm and the bounds against made-up errors.
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 mod audits;
-mod bounds;
 mod budgets;
-mod costs;
-mod damaged;
-mod ladders;
 mod made_up;
-mod random;
-mod real_errors;
-mod remembered;
-mod rules;
-mod searches;
+mod plans;

@@ -151,9 +151,14 @@ impl ReconstructionMethod {
         matches!(self, HybridMesh { .. })
     }
 
-    /// The settings of all methods among which budgets choose: those of methods for images. Settings of one method follow each other, by
-    /// rising effort.
-    pub fn ladder() -> impl Iterator<Item = Self> {
+    /// The methods for views from images alone among which budgets choose: the one that is best in most scenes, and one that draws.
+    #[must_use]
+    pub fn planned_from_images() -> [Self; 2] {
+        [JointCarve { stop_level: 0 }, HybridMesh { merged: None }]
+    }
+
+    /// The methods for views from images alone, some with several settings.
+    pub fn from_images() -> impl Iterator<Item = Self> {
         [
             JointCarve { stop_level: 1 },
             JointCarve { stop_level: 0 },

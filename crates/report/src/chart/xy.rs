@@ -61,6 +61,14 @@ impl XyChart {
         self
     }
 
+    /// The chart alone as SVG.
+    ///
+    /// # Errors
+    /// The chart cannot be drawn.
+    pub fn to_svg(&self) -> Result<String, ReportError> {
+        self.draw(&Palette::for_names(self.series.iter().map(|series| series.name.as_str())))
+    }
+
     /// The chart as SVG, in the palette's colours.
     pub(crate) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
         let legend: Vec<LegendEntry> = self.series.iter().flat_map(|series| legend_entries(series, palette)).collect();

@@ -115,16 +115,6 @@ impl SamplingMethod {
         })
     }
 
-    /// The names of the methods among which budgets choose, each with the least number of images of a set. With fewer the
-    /// first method has the same samples. Cubes, which have no sample cameras near the views, are not among them.
-    pub fn ladder() -> impl Iterator<Item = (&'static str, u32)> {
-        METHODS.into_iter().filter_map(|row| match row.method {
-            Conventional(_) => Some((row.name, 1)),
-            NonRedundant(_) | DepthPeeling { .. } => Some((row.name, 2)),
-            Cube(_) => None,
-        })
-    }
-
     /// The number of images of a set, where it is part of the method.
     #[must_use]
     pub fn own_image_count(self) -> Option<u32> {

@@ -20,7 +20,7 @@ messages! {
         workload, typical_views, batch_count, budget; method: reconstruction_method, codec: frame_codec, in_background: is_background,
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
-    BudgetMeasurement = BudgetMeasurement { compared_lighting };
+    BudgetMeasurement = BudgetMeasurement { truth_lighting };
     MeasureCostsResponse = Measured {
         costs, traced_pixel_count, shared_light, views, busy_s;
         planes: with_normals | with_corner_inverse_depths | with_light, auto_exposure: auto_exposure_ev
@@ -28,8 +28,7 @@ messages! {
     SharedLightCosts = SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s },
         then SharedLightCosts::validate;
     ProbedView = ViewErrors {
-        foreground_ratio, disoccluded_ratio;
-        flip: flip_ratio, flip_whole: flip_whole_ratio, mean_square: mean_square_ratio
+        foreground_ratio; flip: flip_ratio, mean_square: mean_square_ratio
     };
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then |r| finite_seconds(r.scene_load_s, "scene_load_s");
     ReportWorkRequest = WorkReport {

@@ -46,9 +46,8 @@ messages! {
         budget, state, representation, expected_ratio, bound_ratio, probe_view_count, reason, audit
     }, then Promise::validate;
     AuditSummary = AuditSummary {
-        audits_per_s, busy_s, error;
-        audited_views: audited_view_count, covered_views: covered_view_count, uncovered_views: uncovered_view_count,
-        viewers_above: viewer_above_count
+        error;
+        audited_views: audited_view_count, covered_views: covered_view_count, uncovered_views: uncovered_view_count
     };
     ErrorInterval = ErrorInterval { ; low: least_ratio, mean: mean_ratio, high: greatest_ratio };
 }

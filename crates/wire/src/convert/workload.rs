@@ -37,7 +37,7 @@ messages! {
         at_most(a.compositors.len(), MAX_NODES, "compositors")
     }, then Assignment::validate;
     AuditOrder = AuditOrder {
-        time_ratio, least_apart_m, planned_pixel_count, with_sample_images, in_parts; antialias: antialias_sample_count
+        time_ratio, planned_pixel_count, truth_lighting; antialias: antialias_sample_count
     }, then AuditOrder::validate;
     ApplyAssignmentRequest = ApplyPlan { assignment; open_workloads: open_workload_numbers },
         first |r| at_most(r.open_workload_numbers.len(), MAX_WORKLOADS, "open_workload_numbers");

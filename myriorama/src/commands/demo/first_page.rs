@@ -7,14 +7,14 @@ use std::time::Instant;
 use anyhow::Context as _;
 use app_core::print_line;
 use app_core::setup::{SceneArgs, Setup};
-use depth_image::{Antialias, Camera, PinholeCamera, View, ViewPlanes};
+use cluster::Workload;
+use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use metrics::{PictureErrors, flip_map};
-use node::{DirectWork, Engine as _, SampleSet, Turn, ViewWork, WorkClass};
-use probe::{Light, Representation};
+use node::{DirectWork, Engine as _, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
 use render::Lighting;
 use report::Picture;
 
@@ -87,23 +87,18 @@ impl PageViews {
         let antialias = Antialias::of(SAMPLES_A_PIXEL).context("four samples are offered")?;
         let planes = ViewPlanes { antialias, ..ViewPlanes::WITH_DEPTH };
         let lighting = page_scene.lighting;
-        let subject = setup.subject(lighting, planes, 0.0);
-        let sampled = Representation {
-            sampling: page_scene.sampling().to_string(),
-            method: page_scene.method_in(lighting),
-            sample_cameras: setup.samples.iter().copied().map(Camera::Pinhole).collect(),
-        };
-        let set_work = subject.sample_work(engine.as_ref(), &sampled, Light::Session)?;
-        let (images, samples_s) = timed(|| Ok(engine.sample(&set_work, TURN)?))?;
-        let set = SampleSet { images: images.try_into()?, ..subject.sample_set(&[], Light::Session) };
-        let set = engine.upload(&set, TURN)?;
-        let view_work = ViewWork { cameras: vec![camera], method: sampled.method, planes };
+        let method = page_scene.method_in(lighting);
+        let workload = setup.workload(page_scene.sampling(), lighting, &setup.samples);
+        let workload = Workload { planes: engine.sample_planes(&method)?, ..workload };
+        let (images, samples_s) = timed(|| Ok(engine.sample(&SampleWork::of(&workload), TURN)?))?;
+        let set = engine.upload(&SampleSet::of(&workload, images, false)?, TURN)?;
+        let view_work = ViewWork { cameras: vec![camera], method, planes };
         // The first view of a size also makes its buffers and shaders.
         engine.reconstruct(set.as_ref(), &view_work, TURN)?;
         let (view, seconds) = timed(|| one(engine.reconstruct(set.as_ref(), &view_work, TURN)?))?;
         let shared = TimedView { view, seconds, lighting };
         let draw = |camera: PinholeCamera, lighting: Lighting| {
-            let work = subject.direct_work(vec![camera], Light::Session, planes);
+            let work = DirectWork::of(&workload, vec![camera], planes);
             let work = DirectWork { lighting: lighting.to_string(), ..work };
             let (view, seconds) = timed(|| one(engine.draw_direct(&work, TURN)?))?;
             anyhow::Ok(TimedView { view, seconds, lighting })
@@ -111,7 +106,7 @@ impl PageViews {
         draw(camera.resized(WARM_UP_PX), lighting)?;
         let hurried = most_rays_within(seconds, lighting, |lighting| draw(camera, lighting))?;
         let reference = draw(camera, lighting)?;
-        Ok(Self { shared, shares_light: set_work.planes.light, hurried, reference, samples_s })
+        Ok(Self { shared, shares_light: workload.planes.light, hurried, reference, samples_s })
     }
 }
 

@@ -58,7 +58,7 @@ pub struct ViewArgs {
     #[arg(long)]
     pub(super) provenance: bool,
     /// How views are made [default: the coordinator's, or else shared light where light is traced and direct drawing in plain light;
-    /// from samples alone with --budget, and in plain light with --policy pipeline or time-share]
+    /// from samples alone in plain light with --policy pipeline or time-share]
     #[arg(long, value_name = "NAME")]
     method: Option<ReconstructionMethod>,
     #[command(flatten)]
@@ -79,11 +79,10 @@ pub struct ViewArgs {
     /// The policy: pipeline, direct, time-share, or auto (the fastest by prediction)
     #[arg(long, default_value = "auto", value_name = "NAME")]
     pub(super) policy: PolicyChoice,
-    /// The most error, and the most time of a view, as in "flip 0.05" (see `myriorama plan --help`): the cluster chooses what
-    /// is sampled, and how views are reconstructed unless --method says so. Pictures wait for the choice, at most a minute. Where nothing keeps
-    /// the budget, they are written all the same, and the exit status is 3. [default: the coordinator's, for which nothing
-    /// waits]
-    #[arg(long, value_name = "BUDGET")]
+    /// The most error, as in "flip 0.02" or "psnr 34" (see `myriorama plan --help`): the cluster chooses what is sampled, and how views
+    /// are made. Pictures wait for the choice, at most ten minutes. Where nothing keeps the budget, they are written all the same, and the
+    /// exit status is 3. [default: the coordinator's, for which nothing waits]
+    #[arg(long, value_name = "BUDGET", conflicts_with_all = ["method", "quality", "policy"])]
     pub(super) budget: Option<Budget>,
     /// Moments of an animated scene; all views are made of each moment
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

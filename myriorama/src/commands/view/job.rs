@@ -10,6 +10,7 @@ use app_core::print_line;
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferSettings, OfferStatus, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
+use indicatif::ProgressBar;
 
 use super::args::ViewArgs;
 use super::file_names::remove_parts;
@@ -55,14 +56,18 @@ impl Job {
         if self.request.budget.budget.is_none() {
             return Ok(());
         }
+        let progress = ProgressBar::new_spinner();
+        progress.enable_steady_tick(Duration::from_millis(200));
         let settled = async {
             let open = [PromiseState::Measuring, PromiseState::Broken];
             let mut promise = session.promise();
             while promise.as_ref().is_none_or(|promise| open.contains(&promise.state)) {
+                promise.iter().for_each(|promise| progress.set_message(promise.reason.clone()));
                 promise = Some(session.another_promise(promise.as_ref()).await);
             }
         };
         let _ = tokio::time::timeout(longest, settled).await;
+        progress.finish_and_clear();
         session.promise().into_iter().for_each(|promise| print_line!("{promise}"));
         Ok(())
     }
