@@ -8,6 +8,7 @@ mod config;
 mod cost_table;
 mod executor;
 mod grpc_status;
+mod light_samples;
 mod measuring;
 mod measuring_queue;
 mod membership;

@@ -6,8 +6,9 @@ use planner::{Budget, Demand, Row};
 use tonic::Status;
 
 use crate::config::{CoordinatorConfig, SceneOffer};
+use crate::light_samples::LightSamples;
 use crate::schedule::{BudgetPlan, Budgeted};
-use crate::workload::{FULL_LIGHT_DENSITY, light_size_px, workload_of};
+use crate::workload::{light_size_px, workload_of};
 
 /// The session's budget, else the coordinator's; `None` without either, and where the coordinator's is not for the session.
 ///
@@ -52,7 +53,7 @@ pub fn plan_for_session(
     demand: Demand,
 ) -> Result<BudgetPlan, Status> {
     let config = CoordinatorConfig { rows, ..CoordinatorConfig::default() };
-    let workload = workload_of(request, offer, FULL_LIGHT_DENSITY)?;
+    let workload = workload_of(request, offer, LightSamples::FULL)?;
     let budgeted = budgeted(request, &workload, offer, &config)?;
     let budgeted = budgeted.ok_or_else(|| Status::invalid_argument("budget is missing"))?;
     let cells = ViewCell::between(&SampleCamera::references(&workload.sample_cameras)).into_iter().collect();

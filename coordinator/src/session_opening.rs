@@ -3,15 +3,16 @@
 use std::sync::Arc;
 
 use cluster::{Costs, MeasureCosts, Measured, SessionRequest, SessionStage, SharedLightCosts, Workload};
-use depth_image::{SampleCamera, ToneMapping, ViewPlanes};
+use depth_image::{ToneMapping, ViewPlanes};
 use tonic::Status;
 
+use crate::light_samples::{LightSamples, SetDemand};
 use crate::measuring::{known, known_or_measured, send_progress};
 use crate::schedule::{Budgeted, Event, Opening, PolicyOverride};
 use crate::session_budget::budgeted;
 use crate::sessions::EventSender;
 use crate::shared::Shared;
-use crate::workload::{FULL_LIGHT_DENSITY, chooses_light_density, light_density_for_set, workload_of};
+use crate::workload::{chooses_light_samples, workload_of};
 
 /// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not take minutes.
 const MEASURED_BATCH: u32 = 32;
@@ -42,18 +43,27 @@ async fn measured_opening(
     events: &EventSender,
 ) -> Result<Opening, Status> {
     let offer = shared.offers.find(request.scene.as_deref())?;
-    let mut workload = workload_of(&request, offer, FULL_LIGHT_DENSITY)?;
-    let budgeted = budgeted(&request, &workload, offer, &shared.config)?;
-    let mut measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
-    let full_set_s = measured.costs.sample_image_s * workload.of_one_view().view_camera_count() as f64;
-    let density = light_density_for_set(full_set_s);
-    let is_coarser = density != FULL_LIGHT_DENSITY && chooses_light_density(&request, offer);
-    if is_coarser {
-        workload = workload_of(&request, offer, density)?;
-        measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
-    }
+    let full = workload_of(&request, offer, LightSamples::FULL)?;
+    let budgeted = budgeted(&request, &full, offer, &shared.config)?;
+    let free = chooses_light_samples(&request, offer) && budgeted.is_none();
+    let all = if free { LightSamples::all(&request) } else { Vec::new() };
+    // Sessions share samples that cost others least.
+    let open = |samples: &&LightSamples| {
+        let workload = workload_of(&request, offer, **samples);
+        let follows_viewers = !request.viewpoints.is_empty();
+        workload.is_ok_and(|workload| shared.with_scheduler(|s| s.has_workload(&workload, follows_viewers)))
+    };
+    let shared_samples = all.iter().find(open).copied();
+    let admitted = shared_samples.map_or_else(|| Ok(full.clone()), |samples| workload_of(&request, offer, samples))?;
+    let measured = measured_workload(shared, &request, &full, &admitted, budgeted.as_ref(), events).await?;
+    let demand = SetDemand::of(&request, shared.status().nodes.len());
+    let cameras = full.of_one_view().view_camera_count();
+    let samples = all.iter().find(open).copied();
+    let samples = samples.unwrap_or_else(|| LightSamples::cheapest(&all, &measured, cameras, demand));
+    let workload = workload_of(&request, offer, samples)?;
+    let measured = samples.predicted(&measured, cameras);
     let Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light, .. } = measured;
-    let note = if is_coarser { density_note(&workload, &request, full_set_s) } else { String::new() };
+    let note = samples.in_words(demand);
     let last_view_time_ratio = last_view_time_ratio(&request, &costs, shared_light.as_ref());
     // A cube serves views from anywhere: there are no cells to follow viewers.
     let viewpoints = if workload.samples_cube() { Vec::new() } else { request.viewpoints };
@@ -80,13 +90,14 @@ async fn measured_opening(
     })
 }
 
-/// The costs of a workload, once it is admitted: known ones, else they are measured, one session at a time. A session that
+/// The costs of a workload, once the one that is to be opened is admitted: known ones, else they are measured, one session at a time. A session that
 /// would not be admitted is not measured for. A measurement that was begun ends, and its costs are kept, though its client
 /// may leave meanwhile.
 async fn measured_workload(
     shared: &Arc<Shared>,
     request: &SessionRequest,
     workload: &Workload,
+    admitted: &Workload,
     budgeted: Option<&Budgeted>,
     events: &EventSender,
 ) -> Result<Measured, Status> {
@@ -103,7 +114,7 @@ async fn measured_workload(
         budget: None,
     };
     let follows_viewers = !request.viewpoints.is_empty() && !workload.samples_cube();
-    let admits = || shared.with_scheduler(|scheduler| scheduler.admits_workload(workload, budgeted, follows_viewers));
+    let admits = || shared.with_scheduler(|scheduler| scheduler.admits_workload(admitted, budgeted, follows_viewers));
     admits()?;
     if let Some(known) = known(shared, &measurement) {
         return Ok(known);
@@ -127,14 +138,4 @@ fn last_view_time_ratio(request: &SessionRequest, costs: &Costs, light: Option<&
     let Some(light) = light.filter(|_| has_coarser) else { return 1.0 };
     let ratio = (light.surfaces_s + light.look_up_s) / costs.reconstruct_view_s;
     if ratio > 0.0 { ratio.min(1.0) } else { 1.0 }
-}
-
-/// What the reason of a plan says of samples of light that are coarser than views.
-fn density_note(workload: &Workload, request: &SessionRequest, full_set_s: f64) -> String {
-    let sample = workload.sample_cameras.first().and_then(SampleCamera::depth);
-    let sample_focal_px = sample.map_or(0.0, |camera| camera.reference().focal_px.y);
-    let density = sample_focal_px / request.typical_view.focal_px.y;
-    format!(
-        " Samples have {density:.2} times the density of views: in full density a set would take {full_set_s:.0} s."
-    )
 }

@@ -2,11 +2,12 @@
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{CommonCell, DIRECT, SamplePlanes, SessionRequest, Workload};
-use depth_image::{Aabb, Camera, PinholeCamera, SampleCamera, ViewGroup};
+use depth_image::{Aabb, Camera, PinholeCamera, SampleCamera, ViewCell, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
 use crate::config::{OfferedCube, SceneOffer};
+use crate::light_samples::LightSamples;
 use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
@@ -22,42 +23,28 @@ const MIRRORS_DENSITY: f32 = 4.4;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
-/// Texels of an image of light a pixel of a view, each way. Surfaces come from the scene: they need no finer samples.
-pub(crate) const FULL_LIGHT_DENSITY: f32 = 1.0;
-/// The longest time of a device for a set of light in full density.
-const LONGEST_LIGHT_SET_S: f64 = 10.0;
-
-/// The finest of full, half and a quarter of the density in which a set does not take too long, by its number of texels.
-pub(crate) fn light_density_for_set(full_set_s: f64) -> f32 {
-    match full_set_s / LONGEST_LIGHT_SET_S {
-        ratio if ratio <= 1.0 => FULL_LIGHT_DENSITY,
-        ratio if ratio <= 4.0 => 0.5,
-        _ => 0.25,
-    }
-}
-
-/// Completes a request with the scene's defaults. A node tells which planes its method needs. Samples of light have a density of
-/// `light_density` where their size follows the views.
+/// Completes a request with the scene's defaults. A node tells which planes its method needs. `light` are the samples
+/// of light where they follow the views.
 ///
 /// # Errors
 /// For invalid cameras.
 pub(crate) fn workload_of(
     request: &SessionRequest,
     offer: &SceneOffer,
-    light_density: f32,
+    light: LightSamples,
 ) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
     let offered = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
     let drawn = offered.filter(|_| request.method == DIRECT);
     let cube = offered.filter(|_| drawn.is_none()).map(|cube| checked_cube(request, cube)).transpose()?;
-    let size_px = session_size_px(request, offer, light_density);
+    let size_px = session_size_px(request, offer, light);
     let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, size_px, &volume)? };
     let sample_cameras = match cube {
         Some(cube) => {
             let parallel = cube.grid.cameras().map(SampleCamera::from).into_iter();
             parallel.chain(cube.light_field.map(SampleCamera::from)).collect()
         }
-        None => sample_cameras_of(request, offer, size_px, !cells.is_empty())?,
+        None => sample_cameras_of(request, offer, size_px, light, !cells.is_empty())?,
     };
     let workload = Workload {
         scene: offer.scene(),
@@ -103,6 +90,7 @@ fn sample_cameras_of(
     request: &SessionRequest,
     offer: &SceneOffer,
     size_px: Option<UVec2>,
+    light: LightSamples,
     has_cells: bool,
 ) -> Result<Vec<SampleCamera>, Status> {
     let cameras = match (has_cells, request.sample_cameras.is_empty()) {
@@ -116,7 +104,14 @@ fn sample_cameras_of(
     }
     let mut cameras = cameras.clone();
     if let Some(size_px) = size_px {
-        cameras.iter_mut().for_each(|camera| *camera = camera.resized(size_px));
+        let count = light.camera_count.filter(|_| chooses_light_samples(request, offer));
+        let references: Vec<PinholeCamera> = cameras.iter().map(|camera| *camera.reference()).collect();
+        match count.zip(ViewCell::between(&references)) {
+            Some((count, cell)) => {
+                cameras = cell.nested_cameras(count, size_px).into_iter().map(Camera::Pinhole).collect();
+            }
+            None => cameras.iter_mut().for_each(|camera| *camera = camera.resized(size_px)),
+        }
         let valid = cameras.iter().try_for_each(Camera::validate);
         valid.map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
     }
@@ -199,12 +194,12 @@ fn cells_of(
 }
 
 /// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
-fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: f32) -> Option<UVec2> {
+fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light: LightSamples) -> Option<UVec2> {
     if !has_fitted_size(request, offer) {
         return request.sample_size_px;
     }
     let (density, most_texels) = match request.takes_light {
-        true => (light_density, MAX_LIGHT_TEXELS),
+        true => (light.density, MAX_LIGHT_TEXELS),
         false => (SAMPLE_DENSITY, MAX_FITTING_TEXELS),
     };
     size_of_density(&offer.rig, &request.typical_view, density, most_texels)
@@ -215,15 +210,15 @@ fn has_fitted_size(request: &SessionRequest, offer: &SceneOffer) -> bool {
     offer.fits_views && request.sample_cameras.is_empty() && request.sample_size_px.is_none()
 }
 
-/// Whether the density of a session's samples of light may be chosen.
-pub(crate) fn chooses_light_density(request: &SessionRequest, offer: &SceneOffer) -> bool {
+/// Whether the number and the density of a session's samples of light may be chosen; in view cells, the density.
+pub(crate) fn chooses_light_samples(request: &SessionRequest, offer: &SceneOffer) -> bool {
     request.takes_light && has_fitted_size(request, offer)
 }
 
 /// The size of offered images that makes them as dense as a view, for samples of light. `None` without images or with a
 /// degenerate view.
 pub(crate) fn light_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
-    size_of_density(rig, view, FULL_LIGHT_DENSITY, MAX_LIGHT_TEXELS)
+    size_of_density(rig, view, LightSamples::FULL.density, MAX_LIGHT_TEXELS)
 }
 
 /// The size of offered images that makes them about `density` times as dense as a view. Sizes are whole steps of √2 apart, so
@@ -268,7 +263,6 @@ mod tests {
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
         assert_eq!(light_size_px(&[], &camera(4, 3)), None);
         assert_eq!(size_of_density(&rig, &camera(400, 300), 1.0, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
-        assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(light_density_for_set), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
         assert_eq!(size_of_density(&rig, &camera(800, 600), 0.5, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
     }
 }

@@ -54,6 +54,12 @@ impl Scheduler {
         Ok(())
     }
 
+    /// Whether a workload is open that a session without a budget can share.
+    #[must_use]
+    pub fn has_workload(&self, workload: &Workload, follows_viewers: bool) -> bool {
+        self.workloads.values().any(|open| open.is_shared_by(workload, None, follows_viewers))
+    }
+
     /// Whether a session of this workload may be opened, as far as is known before its costs and planes are.
     ///
     /// # Errors
