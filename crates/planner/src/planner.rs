@@ -13,13 +13,13 @@ use crate::budget::Budget;
 use crate::invalid::{InvalidField, within};
 use crate::moments::upper_bound;
 use crate::probe_view::ProbeView;
-use crate::row::{Demand, MAX_ROWS, Row, RowCosts};
+use crate::row::{Demand, MAX_ROWS, Row, RowCosts, error_after};
 use crate::view_errors::ViewErrors;
 
 /// Common views of each comparison.
 const VIEWS: [usize; 3] = [1, 4, 8];
 /// Fresh views of a test.
-const FRESH_VIEWS: usize = 20;
+const FRESH_VIEWS: usize = 32;
 /// Rows that are left after screening.
 const FINALISTS: usize = 4;
 /// The most rows that are measured.
@@ -157,7 +157,7 @@ impl Probed {
     /// # Errors
     /// For a value that its field does not allow.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        within(self.views.len(), 1..=FRESH_VIEWS, "views", "from 1 to 20")?;
+        within(self.views.len(), 1..=FRESH_VIEWS, "views", "from 1 to 32")?;
         self.views.iter().try_for_each(ViewErrors::validate)?;
         within(self.busy_s, 0.0..=1e6, "busy_s", "from 0 to 10^6")?;
         self.costs.validate()
@@ -252,15 +252,10 @@ impl Planner {
     #[must_use]
     pub fn costs(&self, row: usize) -> Option<RowCosts> {
         let all = &self.rows.get(row)?.costs;
-        let median = |cost: fn(&RowCosts) -> f64| {
-            let mut values: Vec<f64> = all.iter().map(cost).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied()
-        };
         Some(RowCosts {
-            sample_image_s: median(|costs| costs.sample_image_s)?,
-            load_set_s: median(|costs| costs.load_set_s)?,
-            view_s: median(|costs| costs.view_s)?,
+            sample_image_s: median(all.iter().map(|costs| costs.sample_image_s))?,
+            load_set_s: median(all.iter().map(|costs| costs.load_set_s))?,
+            view_s: median(all.iter().map(|costs| costs.view_s))?,
         })
     }
 
@@ -367,11 +362,10 @@ impl Planner {
         let own = &self.request.rows[row];
         let measured = (0..self.rows.len()).filter(|&other| self.is_measured(other) && !self.is_exact(other));
         let alike = measured.filter_map(|other| Some((other, own.doublings_from(&self.request.rows[other])?)));
-        let nearest = alike.min_by(|(_, a), (_, b)| a.distance().total_cmp(&b.distance()));
+        let nearest = alike.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
         let Some((other, doublings)) = nearest else { return f64::INFINITY };
-        let costs = doublings.costs(&self.costs(other).unwrap_or_default());
-        let error_ratio = self.error_ratio(other) * doublings.error_ratio();
-        let over = error_ratio / self.request.budget.most_ratio();
+        let costs = self.costs(other).unwrap_or_default().after(doublings);
+        let over = self.error_ratio(other) * error_after(doublings) / self.request.budget.most_ratio();
         self.request.demand.price_s(own, &costs) * over.max(1.0).powi(4)
     }
 
@@ -429,17 +423,28 @@ impl Planner {
     }
 }
 
-/// The test of a budget on fresh views; `None` where it fails.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+fn distance(doublings: &[f64; 3]) -> f64 {
+    doublings.iter().map(|times| times.abs()).sum()
+}
+
+/// The test of a budget on fresh views; `None` where it fails. The mean over the foreground is a ratio of two means, of errors and of
+/// foreground. Its bound is Student's with the deviations of that ratio (Cochran 1977, section 6.4): how much foreground views have
+/// does not widen it.
 fn tested(views: &[ViewErrors], budget: &Budget) -> Option<TestedError> {
-    let excess: Vec<f64> = views.iter().map(|view| view.excess(budget)).collect();
     let foreground_ratio = views.iter().map(|view| view.foreground_ratio).sum::<f64>() / views.len() as f64;
-    let bound = upper_bound(&excess).filter(|&bound| bound <= 0.0 && foreground_ratio > 0.0)?;
-    Some(TestedError {
-        mean_ratio: ViewErrors::mean_error(views, budget),
-        bound_ratio: (budget.most_ratio() + bound / foreground_ratio).max(0.0),
-        foreground_ratio,
-        views: views.len(),
-    })
+    let mean_ratio = ViewErrors::mean_error(views, budget);
+    let deviations = views.iter().map(|view| {
+        view.foreground_ratio * (view.error_ratio(budget) - mean_ratio) / foreground_ratio.max(f64::MIN_POSITIVE)
+    });
+    let bound_ratio = mean_ratio + upper_bound(&deviations.collect::<Vec<f64>>())?;
+    let passes = bound_ratio <= budget.most_ratio() && foreground_ratio > 0.0;
+    passes.then_some(TestedError { mean_ratio, bound_ratio, foreground_ratio, views: views.len() })
 }
 
 fn milliseconds(seconds: f64) -> String {

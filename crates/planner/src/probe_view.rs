@@ -1,5 +1,7 @@
 //! The views on which rows are measured.
 
+use std::array;
+
 use serde::{Deserialize, Serialize};
 
 use crate::random::unit;
@@ -30,6 +32,9 @@ pub struct ProbePlace {
 
 /// One common view in so many is whole.
 const WHOLE_EVERY: u64 = 4;
+/// Steps of low-discrepancy sequences (Roberts 2018): of one dimension for the cell, of three for the eye, of two for the part. Few
+/// views are spread evenly over the cell and the picture, most of which may show no surface.
+const STEPS: [f64; 6] = [0.618_034, 0.819_173, 0.671_044, 0.549_701, 0.754_878, 0.569_840];
 
 impl ProbeView {
     /// Whether the whole view is compared, and timed; else a part of it, chosen at random, which has the view's errors in the mean.
@@ -38,14 +43,15 @@ impl ProbeView {
         matches!(self, Self::Common(number) if number % WHOLE_EVERY == 0)
     }
 
-    /// The place of the view in the plan of a number.
+    /// The place of the view in the plan of a number, which moves the whole sequence: every place is equally likely.
     #[must_use]
     pub fn place(self, plan: u64) -> ProbePlace {
         let (seed, number) = match self {
             Self::Common(number) => (COMMON_SEED, number),
             Self::Fresh(number) => (plan, number),
         };
-        let [cell, x, y, z, column, row] = [0, 1, 2, 3, 4, 5].map(|axis| unit(seed, number.wrapping_mul(6) + axis));
+        let [cell, x, y, z, column, row] =
+            array::from_fn(|axis| (unit(seed, axis as u64) + number as f64 * STEPS[axis]).fract());
         ProbePlace { cell, eye: [x, y, z], part: [column, row] }
     }
 }

@@ -10,10 +10,8 @@ use crate::invalid::{InvalidField, name, within};
 pub const MAX_ROWS: usize = 49;
 /// The most sample cameras of a row, in one view cell.
 const MAX_CAMERAS: u32 = 9;
-/// The error with twice the cameras, density or rays, over that without.
-const ERROR_OF_CAMERAS: f64 = 0.85;
-const ERROR_OF_DENSITY: f64 = 0.75;
-const ERROR_OF_RAYS: f64 = 0.75;
+/// The error with twice the cameras, density or rays, over that without: what these bring in most scenes.
+const ERROR_OF_DOUBLING: [f64; 3] = [0.85, 0.75, 0.75];
 /// More seconds than any cost has.
 const MOST_SECONDS: f64 = 1e6;
 
@@ -57,50 +55,20 @@ impl Row {
     }
 
     /// By how many doublings of cameras, density and rays the row is above another of its method; `None` for another method.
-    pub(crate) fn doublings_from(&self, other: &Self) -> Option<Doublings> {
+    pub(crate) fn doublings_from(&self, other: &Self) -> Option<[f64; 3]> {
         match (self, other) {
             (
                 Self::Samples { method, camera_count, density },
                 Self::Samples { method: other_method, camera_count: other_count, density: other_density },
             ) if method == other_method => {
-                let cameras = (f64::from(*camera_count) / f64::from(*other_count)).log2();
-                Some(Doublings { cameras, density: (density / other_density).log2(), rays: 0.0 })
+                let cameras = f64::from(*camera_count) / f64::from(*other_count);
+                Some([cameras.log2(), (density / other_density).log2(), 0.0])
             }
             (Self::Direct { ray_ratio, .. }, Self::Direct { ray_ratio: other, .. }) => {
-                Some(Doublings { cameras: 0.0, density: 0.0, rays: (ray_ratio / other).log2() })
+                Some([0.0, 0.0, (ray_ratio / other).log2()])
             }
             _ => None,
         }
-    }
-}
-
-/// The effort of a row over that of another, in powers of two.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Doublings {
-    cameras: f64,
-    density: f64,
-    rays: f64,
-}
-
-impl Doublings {
-    pub(crate) fn distance(self) -> f64 {
-        self.cameras.abs() + self.density.abs() + self.rays.abs()
-    }
-
-    /// The costs of the row, as far as they follow from those of the other: images have this many times the texels, and views
-    /// take about as long.
-    pub(crate) fn costs(self, other: &RowCosts) -> RowCosts {
-        let texels = 4_f64.powf(self.density);
-        RowCosts {
-            sample_image_s: other.sample_image_s * texels,
-            load_set_s: other.load_set_s * texels * self.cameras.exp2(),
-            view_s: other.view_s,
-        }
-    }
-
-    /// The error of the row over that of the other, by what samples and rays bring in most scenes.
-    pub(crate) fn error_ratio(self) -> f64 {
-        ERROR_OF_CAMERAS.powf(self.cameras) * ERROR_OF_DENSITY.powf(self.density) * ERROR_OF_RAYS.powf(self.rays)
     }
 }
 
@@ -127,6 +95,17 @@ pub struct RowCosts {
 }
 
 impl RowCosts {
+    /// The costs of a row that is so many [doublings](Row::doublings_from) above: images have more texels, and views take about as
+    /// long.
+    pub(crate) fn after(&self, [cameras, density, _]: [f64; 3]) -> Self {
+        let texels = 4_f64.powf(density);
+        Self {
+            sample_image_s: self.sample_image_s * texels,
+            load_set_s: self.load_set_s * texels * cameras.exp2(),
+            view_s: self.view_s,
+        }
+    }
+
     pub(crate) fn validate(&self) -> Result<(), InvalidField> {
         let fields =
             [(self.sample_image_s, "sample_image_s"), (self.load_set_s, "load_set_s"), (self.view_s, "view_s")];
@@ -155,4 +134,9 @@ impl Demand {
         let loaded_s = cells * self.nodes.max(1) as f64 * costs.load_set_s;
         (sampled_s + loaded_s) / self.views_a_set.max(1) as f64 + costs.view_s
     }
+}
+
+/// The error of a row that is so many [doublings](Row::doublings_from) above another, over that of the other.
+pub(crate) fn error_after(doublings: [f64; 3]) -> f64 {
+    ERROR_OF_DOUBLING.into_iter().zip(doublings).map(|(error, times)| error.powf(times)).product()
 }

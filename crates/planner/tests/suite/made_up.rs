@@ -53,9 +53,9 @@ pub struct Scene {
     pub rows: Vec<Row>,
     pub errors: Vec<f64>,
     pub costs: Vec<RowCosts>,
-    /// The coefficient of variation of errors between views, and the share of foreground.
+    /// The coefficient of variation of errors between views, and the most foreground of a view.
     variation: f64,
-    foreground_ratio: f64,
+    most_foreground_ratio: f64,
     random: Random,
 }
 
@@ -97,14 +97,14 @@ impl Scene {
             costs.push(RowCosts { view_s: cost.view_s * cost_noise, ..cost });
         }
         let variation = random.between(0.1, 0.5);
-        let foreground_ratio = random.between(0.2, 1.0);
-        Self { rows, errors, costs, variation, foreground_ratio, random }
+        let most_foreground_ratio = random.between(0.2, 1.0);
+        Self { rows, errors, costs, variation, most_foreground_ratio, random }
     }
 
     /// A view of a row: whatever is hard for one row is about as hard for the others.
-    fn view(&mut self, row: usize, difficulty: f64) -> ViewErrors {
+    fn view(&mut self, row: usize, difficulty: f64, foreground_ratio: f64) -> ViewErrors {
         let flip = (self.errors[row] * difficulty * self.random.factor(0.05)).clamp(0.0, 1.0);
-        ViewErrors { foreground_ratio: self.foreground_ratio, flip, mean_square: flip * flip }
+        ViewErrors { foreground_ratio, flip, mean_square: flip * flip }
     }
 
     /// The answer to a probe.
@@ -113,7 +113,7 @@ impl Scene {
             let place = view.place(probe.id.plan);
             let mut random = Random((place.cell * 1e15) as u64);
             let difficulty = random.factor(self.variation);
-            self.view(probe.row, difficulty)
+            self.view(probe.row, difficulty, self.most_foreground_ratio * random.unit())
         });
         let views: Vec<ViewErrors> = views.collect();
         let own = self.costs[probe.row];
