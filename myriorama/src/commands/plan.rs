@@ -10,12 +10,11 @@ use app_core::print_line;
 use app_core::setup::{DeviceArgs, SceneArgs};
 use app_core::sizes::SizePx;
 use clap::Args;
-use coordinator::schedule::BudgetPlan;
 use depth_image::{Antialias, ViewCell};
 use engine::GpuEngine;
 use glam::Vec2;
 use indicatif::ProgressBar;
-use planner::{Budget, Demand, Metric, Row, RowSummary};
+use planner::{Budget, Demand, Metric, PlanRequest, Planner, Row, RowSummary};
 use probe::Probers;
 use reconstruction::ReconstructionMethod;
 use report::{Axis, Limit, Point, Series, Table, XyChart};
@@ -61,6 +60,8 @@ Exit status: 0 the budget is kept; 2 arguments or input that cannot be used; 3 n
 const SHARED: &str = "shared light";
 const IMAGES: &str = "samples alone";
 const DIRECT: &str = "direct drawing";
+/// Rows whose prices are closer to that of the choice, in powers of two, are not named.
+const LABELS_APART: f64 = 0.3;
 /// The time of a plan is compared with that of so many views.
 const COMPARED_VIEWS: f64 = 24.0;
 
@@ -90,7 +91,7 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
         progress.set_message(format!("{}: {count} measurements in {spent_s:.1} s", args.budget));
     })?;
     progress.finish_and_clear();
-    let lines = lines(&plan);
+    let lines = lines(&plan.planner);
     print_line!("{}", table(&front(&lines)).to_text());
     if let Some(path) = &args.chart {
         let svg = chart(args.budget, &lines).to_svg()?;
@@ -110,32 +111,46 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
 }
 
 /// A row that was measured.
-struct Line<'p> {
-    row: &'p Row,
-    summary: RowSummary,
+struct Line {
+    name: String,
+    /// The series of the chart.
+    family: &'static str,
+    price_ms: f64,
     error_ratio: f64,
-    /// The same as a person reads it.
+    /// The error as a person reads it.
     error: String,
     is_chosen: bool,
 }
 
 /// All measured rows, the cheapest first.
-fn lines(plan: &BudgetPlan) -> Vec<Line<'_>> {
-    let chosen = plan.planner.outcome().and_then(|outcome| outcome.kept.first().copied());
-    let rows = plan.planner.request().rows.iter().enumerate();
-    let lines = rows.filter_map(|(place, row)| {
-        let summary = plan.planner.summary(place)?;
-        let error_ratio = summary.tested.map(|tested| tested.mean_ratio).or(summary.error_ratio)?;
-        let error = plan.planner.request().budget.shown(error_ratio);
-        Some(Line { row, summary, error_ratio, error, is_chosen: chosen == Some(place) })
+fn lines(planner: &Planner) -> Vec<Line> {
+    let chosen = planner.outcome().and_then(|outcome| outcome.kept.first().copied());
+    let PlanRequest { rows, budget, .. } = planner.request();
+    let lines = rows.iter().enumerate().filter_map(|(place, row)| {
+        let RowSummary { error_ratio, price_s, tested } = planner.summary(place)?;
+        let error_ratio = tested.map(|tested| tested.mean_ratio).or(error_ratio)?;
+        Some(Line {
+            name: row.to_string(),
+            family: family_of(row),
+            price_ms: price_s * 1e3,
+            error_ratio,
+            error: budget.shown(error_ratio),
+            is_chosen: chosen == Some(place),
+        })
     });
-    let mut lines: Vec<Line<'_>> = lines.collect();
-    lines.sort_by(|a, b| a.summary.price_s.total_cmp(&b.summary.price_s));
+    let mut lines: Vec<Line> = lines.collect();
+    lines.sort_by(|a, b| a.price_ms.total_cmp(&b.price_ms));
     lines
 }
 
+fn family_of(row: &Row) -> &'static str {
+    let Row::Samples { method, .. } = row else { return DIRECT };
+    let shares_light = method.parse().is_ok_and(|method: ReconstructionMethod| method.light_cache_quality().is_some());
+    if shares_light { SHARED } else { IMAGES }
+}
+
 /// The lines with an error below that of every cheaper one, and the choice.
-fn front<'l, 'p>(by_price: &'l [Line<'p>]) -> Vec<&'l Line<'p>> {
+fn front(by_price: &[Line]) -> Vec<&Line> {
     let mut least = f64::INFINITY;
     let lines = by_price.iter().filter(|line| {
         let is_better = line.error_ratio < least;
@@ -145,46 +160,41 @@ fn front<'l, 'p>(by_price: &'l [Line<'p>]) -> Vec<&'l Line<'p>> {
     lines.collect()
 }
 
-fn table(front: &[&Line<'_>]) -> Table {
+fn table(front: &[&Line]) -> Table {
     Table::of_rows(
         "Front of cost against error",
         front,
         &[
             ("error", "", |line| line.error.as_str().into()),
-            ("a view", "ms", |line| (line.summary.price_s * 1e3).into()),
-            ("row", "", |line| line.row.to_string().into()),
+            ("a view", "ms", |line| line.price_ms.into()),
+            ("row", "", |line| line.name.as_str().into()),
             ("", "", |line| if line.is_chosen { "chosen" } else { "" }.into()),
         ],
     )
 }
 
 /// Cost against error of all measured rows, with their front, the budget and the choice.
-fn chart(budget: Budget, lines: &[Line<'_>]) -> XyChart {
-    let (name, unit) = match budget.metric() {
-        Metric::Flip => ("FLIP over surfaces", ""),
-        Metric::Psnr => ("mean squared error over surfaces", ""),
+fn chart(budget: Budget, lines: &[Line]) -> XyChart {
+    let error = match budget.metric() {
+        Metric::Flip => "FLIP over surfaces",
+        Metric::Psnr => "mean squared error over surfaces",
     };
-    let mut chart = XyChart::new(
-        format!("Cost against error, {budget}"),
-        Axis::log("nodes' time for a view", "ms"),
-        Axis::linear(name, unit),
-    );
+    let cost = Axis::log("nodes' time for a view", "ms");
+    let mut chart = XyChart::new(format!("Cost against error, {budget}"), cost, Axis::linear(error, ""));
+    let front = front(lines);
+    let chosen: Vec<&Line> = lines.iter().filter(|line| line.is_chosen).collect();
     for family in [SHARED, IMAGES, DIRECT] {
-        let own = lines.iter().filter(|line| family_of(line.row) == family);
-        let points =
-            own.map(|line| Point::labelled(line.summary.price_s * 1e3, line.error_ratio, line.row.to_string()));
+        let points = lines.iter().filter(|line| line.family == family).map(|line| {
+            // Names would cover each other: those of the front are read, and of rows about as cheap as the choice its own.
+            let is_apart = chosen.iter().all(|chosen| (line.price_ms / chosen.price_ms).log2().abs() > LABELS_APART);
+            let is_named = front.iter().any(|other| std::ptr::eq(*other, line)) && (line.is_chosen || is_apart);
+            let name = if is_named { line.name.as_str() } else { "" };
+            Point::labelled(line.price_ms, line.error_ratio, name)
+        });
         chart = chart.with(Series::points(family, points));
     }
-    let chosen = lines.iter().filter(|line| line.is_chosen);
-    let chosen = chosen.map(|line| Point::from((line.summary.price_s * 1e3, line.error_ratio)));
-    chart = chart.with(Series::points("chosen", chosen));
-    chart.staircase = front(lines).iter().map(|line| (line.summary.price_s * 1e3, line.error_ratio).into()).collect();
+    chart = chart.with(Series::points("chosen", chosen.iter().map(|line| (line.price_ms, line.error_ratio))));
+    chart.staircase = front.iter().map(|line| (line.price_ms, line.error_ratio).into()).collect();
     chart.limits = vec![Limit { name: budget.to_string(), y: budget.most_ratio() }];
     chart
-}
-
-fn family_of(row: &Row) -> &'static str {
-    let Row::Samples { method, .. } = row else { return DIRECT };
-    let shares_light = method.parse().is_ok_and(|method: ReconstructionMethod| method.light_cache_quality().is_some());
-    if shares_light { SHARED } else { IMAGES }
 }
