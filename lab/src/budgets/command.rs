@@ -6,8 +6,9 @@ use app_core::progress::bar;
 use clap::Args;
 use glam::UVec2;
 
+use super::defaults::defaults;
 use super::held_out::held_out;
-use super::report::{add_plans, add_scene};
+use super::report::{add_defaults, add_plans, add_scene};
 use super::table::{Stage, Subject};
 use crate::study::{RunArgs, is_named};
 
@@ -47,6 +48,7 @@ pub fn run(args: &PlannerArgs) -> anyhow::Result<Outcome> {
     report.parameter("lighting", LIGHTING);
     report.parameter("views", size_px.to_string());
     let mut plans = Vec::new();
+    let mut default_rows = Vec::new();
     for scene in SCENES.into_iter().filter(|scene| is_named(scene, &args.scenes)) {
         let stage = Stage::new(&engine, Subject { scene, lighting: LIGHTING.parse()?, size_px })?;
         let progress = bar(format!("rows, {scene}"), Stage::steps(planner::MAX_ROWS));
@@ -54,7 +56,11 @@ pub fn run(args: &PlannerArgs) -> anyhow::Result<Outcome> {
         progress.finish_and_clear();
         add_scene(&mut report, scene, &table)?;
         plans.extend(held_out(&stage, &table, args.seed, count)?);
+        let experiment = stage.experiment(args.study.device.device)?;
+        default_rows.extend(defaults(&experiment, scene, stage.typical_view()?, &table)?);
+        experiment.stop()?;
     }
     add_plans(&mut report, &plans)?;
+    add_defaults(&mut report, &default_rows)?;
     args.study.finish("out/study/planner", &report)
 }

@@ -3,6 +3,7 @@
 use planner::{Budget, Row};
 use report::{Axis, Bar, Check, Point, Report, Series, XyChart};
 
+use super::defaults::DefaultRow;
 use super::held_out::HeldOutPlan;
 use super::table::TableRow;
 use crate::pareto::{Better, with_front};
@@ -15,6 +16,8 @@ const MOST_PRICE_RATIO: f64 = 1.10;
 const LEAST_KEPT: f64 = 0.95;
 /// The median time of a plan over that of 24 directly drawn views, at most.
 const MOST_TIME_RATIO: f64 = 1.5;
+/// The price of a default over that of the best row at the same quality, at most.
+const MOST_DEFAULT_RATIO: f64 = 1.25;
 /// Of charts.
 const VIEWS_A_SET: usize = 290;
 
@@ -27,6 +30,13 @@ const PLAN_COLUMNS: [Column<HeldOutPlan>; 8] = [
     Column::with_unit("price over cheapest", "×", |plan| plan.price_ratio.into()),
     Column::with_unit("time over 24 direct views", "×", |plan| plan.time_ratio.into()),
     Column::new("measurements", |plan| (plan.measurements as usize).into()),
+];
+
+const DEFAULT_COLUMNS: [Column<DefaultRow>; 4] = [
+    Column::new("scene", |row| row.scene.into()),
+    Column::new("V", |row| row.views_a_set.into()),
+    Column::new("default", |row| row.row.to_string().into()),
+    Column::with_unit("price over that of the best", "×", |row| row.price_ratio.into()),
 ];
 
 /// The beginning of the names of tables of rows, and their columns that other commands read.
@@ -85,6 +95,19 @@ pub fn add_plans(report: &mut Report, plans: &[HeldOutPlan]) -> anyhow::Result<(
         Check::new("budgets kept on views that no plan saw", kept, "", Bar::AtLeast(LEAST_KEPT)),
         Check::new("time of a plan over that of 24 direct views, median", time, "×", Bar::AtMost(MOST_TIME_RATIO)),
     ]);
+    Ok(())
+}
+
+/// Adds the defaults of sessions without a budget, and a check of each.
+///
+/// # Errors
+/// A row that does not fit its table.
+pub fn add_defaults(report: &mut Report, rows: &[DefaultRow]) -> anyhow::Result<()> {
+    report.tables.push(table("Defaults", &DEFAULT_COLUMNS, rows)?);
+    report.checks.extend(rows.iter().map(|row| {
+        let name = format!("default of {}, {} views a set: price over that of the best", row.scene, row.views_a_set);
+        Check::new(name, row.price_ratio, "×", Bar::AtMost(MOST_DEFAULT_RATIO))
+    }));
     Ok(())
 }
 

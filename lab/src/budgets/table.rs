@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::experiment::Experiment;
 use app_core::planning::PlannedViews;
 use app_core::setup::{SceneArgs, Setup};
 use coordinator::schedule::BudgetPlan;
-use depth_image::{Antialias, ViewCell};
+use depth_image::{Antialias, PinholeCamera, ViewCell};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2};
+use gpu::DevicePreference;
 use node::ViewProbes;
 use planner::{Budget, Demand, Probe, ProbeId, ProbeView, Row, RowCosts, ViewErrors};
 use probe::Probers;
@@ -36,6 +38,7 @@ pub struct Subject {
 /// A subject on the device.
 pub struct Stage {
     pub subject: Subject,
+    args: SceneArgs,
     setup: Setup,
     engine: Arc<GpuEngine>,
     probers: Probers,
@@ -56,7 +59,24 @@ impl Stage {
         let args = SceneArgs { lighting: subject.lighting, ..SceneArgs::new(fixtures::spec(subject.scene)?) };
         let setup = args.load()?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
-        Ok(Self { subject, setup, engine: engine.clone(), probers: Probers::new(engine.clone()) })
+        Ok(Self { subject, args, setup, engine: engine.clone(), probers: Probers::new(engine.clone()) })
+    }
+
+    /// A view from the middle of the cell.
+    ///
+    /// # Errors
+    /// The scene has no sample cameras.
+    pub fn typical_view(&self) -> anyhow::Result<PinholeCamera> {
+        let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
+        Ok(cell.camera_at(Vec2::ZERO, self.subject.size_px))
+    }
+
+    /// A cluster of one node with the scene.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn experiment(&self, device: DevicePreference) -> anyhow::Result<Experiment> {
+        Experiment::start(self.args.clone(), self.args.load()?, device, 1)
     }
 
     /// A plan that has measured nothing yet.
@@ -64,8 +84,7 @@ impl Stage {
     /// # Errors
     /// The scene has no sample cameras, or the device fails.
     pub fn plan(&self, budget: Budget, demand: Demand, number: u64) -> anyhow::Result<BudgetPlan> {
-        let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
-        let typical_view = cell.camera_at(Vec2::ZERO, self.subject.size_px);
+        let typical_view = self.typical_view()?;
         let antialias = Antialias::of(4).context("four samples are offered")?;
         let lighting = self.subject.lighting;
         PlannedViews { budget, typical_view, antialias, lighting, demand, number }
