@@ -48,7 +48,6 @@ struct ChosenView {
     order: AuditOrder,
     source: Source,
     set_index: u32,
-    stream: u64,
     camera: PinholeCamera,
     part: ViewPart,
 }
@@ -82,7 +81,6 @@ impl Auditor {
                     order,
                     source: chosen.set.source.clone(),
                     set_index: set_index(key),
-                    stream: chosen.reply.outbox().stream,
                     part: audited_part(camera.size_px, random),
                     camera,
                     plan,
@@ -94,7 +92,7 @@ impl Auditor {
 
     async fn audit(self: Arc<Self>, chosen: ChosenView, random: u64) {
         let Assignment { plan_epoch, workload_number, .. } = *chosen.plan;
-        let ChosenView { stream, camera, part, .. } = chosen;
+        let ChosenView { camera, part, .. } = chosen;
         let share = chosen.order.time_ratio.min(self.node.config.direct_share);
         // Whatever becomes of the task, the next audit follows.
         let compared = tokio::spawn(self.clone().compare(chosen)).await;
@@ -103,8 +101,8 @@ impl Auditor {
         match &compared {
             Ok((errors, busy_s)) => {
                 let is_part = part != ViewPart::whole(camera.size_px);
-                let view = AuditedView { plan_epoch, stream, camera, errors: *errors, is_part };
-                metrics.done.audited(workload_number, view, *busy_s);
+                let view = AuditedView { plan_epoch, errors: *errors, is_part };
+                metrics.done.audited(workload_number, view);
                 metrics.audited_views.inc();
                 metrics.audit_s.inc_by(*busy_s);
             }

@@ -6,6 +6,7 @@ use cluster::{Costs, MeasureCosts, Measured, SessionRequest, SessionStage, Share
 use depth_image::{ToneMapping, ViewPlanes};
 use tonic::Status;
 
+use crate::config::SceneOffer;
 use crate::light_samples::{LightSamples, SetDemand};
 use crate::measuring::{known, known_or_measured, send_progress};
 use crate::schedule::{Budgeted, Event, Opening, PolicyOverride};
@@ -45,20 +46,15 @@ async fn measured_opening(
     let offer = shared.offers.find(request.scene.as_deref())?;
     let full = workload_of(&request, offer, LightSamples::FULL)?;
     let budgeted = budgeted(&request, &full, offer, &shared.config)?;
-    let free = chooses_light_samples(&request, offer) && budgeted.is_none();
-    let all = if free { LightSamples::all(&request) } else { Vec::new() };
-    // Sessions share samples that cost others least.
-    let open = |samples: &&LightSamples| {
-        let workload = workload_of(&request, offer, **samples);
-        let follows_viewers = !request.viewpoints.is_empty();
-        workload.is_ok_and(|workload| shared.with_scheduler(|s| s.has_workload(&workload, follows_viewers)))
-    };
-    let shared_samples = all.iter().find(open).copied();
-    let admitted = shared_samples.map_or_else(|| Ok(full.clone()), |samples| workload_of(&request, offer, samples))?;
+    let is_free = chooses_light_samples(&request, offer) && budgeted.is_none();
+    let all = if is_free { LightSamples::all(&request) } else { Vec::new() };
+    let open = open_samples(shared, &request, offer, &all);
+    let admitted = workload_of(&request, offer, open.unwrap_or(LightSamples::FULL))?;
     let measured = measured_workload(shared, &request, &full, &admitted, budgeted.as_ref(), events).await?;
     let demand = SetDemand::of(&request, shared.status().nodes.len());
     let cameras = full.of_one_view().view_camera_count();
-    let samples = all.iter().find(open).copied();
+    // Others have opened their workloads meanwhile.
+    let samples = open_samples(shared, &request, offer, &all);
     let samples = samples.unwrap_or_else(|| LightSamples::cheapest(&all, &measured, cameras, demand));
     let workload = workload_of(&request, offer, samples)?;
     let measured = samples.predicted(&measured, cameras);
@@ -90,9 +86,24 @@ async fn measured_opening(
     })
 }
 
-/// The costs of a workload, once the one that is to be opened is admitted: known ones, else they are measured, one session at a time. A session that
-/// would not be admitted is not measured for. A measurement that was begun ends, and its costs are kept, though its client
-/// may leave meanwhile.
+/// The samples of an open workload that a session can share: another set would cost more than its own best samples save.
+fn open_samples(
+    shared: &Shared,
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    all: &[LightSamples],
+) -> Option<LightSamples> {
+    let follows_viewers = !request.viewpoints.is_empty();
+    let mut all = all.iter().copied();
+    all.find(|&samples| {
+        let workload = workload_of(request, offer, samples);
+        workload.is_ok_and(|workload| shared.with_scheduler(|s| s.has_workload(&workload, follows_viewers)))
+    })
+}
+
+/// The costs of a workload, once the one that is to be opened is admitted: known ones, else they are measured, one session at
+/// a time. A session that would not be admitted is not measured for. A measurement that was begun ends, and its costs are
+/// kept, though its client may leave meanwhile.
 async fn measured_workload(
     shared: &Arc<Shared>,
     request: &SessionRequest,

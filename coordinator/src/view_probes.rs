@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cluster::{Measured, SamplePlanes};
-use planner::{Probed, RowCosts};
+use cluster::SamplePlanes;
+use planner::Probed;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
@@ -39,13 +39,9 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<(Probed, SamplePlan
     let ViewProbe { id, address, request, .. } = probe;
     let node = NodeClient::new(shared.connections.to(&address).await?);
     let answer = within(PROBED_WITHIN, "measuring views", node.measure_costs(request)).await;
-    let Measured { costs, views, busy_s, planes, .. } = answer.map_err(|status| of_node(&address, &status))?;
-    let costs = RowCosts {
-        sample_image_s: costs.sample_image_s,
-        load_set_s: costs.load_set_s,
-        view_s: costs.reconstruct_view_s,
-    };
-    let probed = Probed { id, views, costs, busy_s };
+    let measured = answer.map_err(|status| of_node(&address, &status))?;
+    let planes = measured.planes;
+    let probed = measured.probed(id);
     probed.validate().map_err(|error| Status::out_of_range(format!("{address}: {error}")))?;
     Ok((probed, planes))
 }

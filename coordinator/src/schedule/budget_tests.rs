@@ -171,16 +171,12 @@ impl Cluster {
         let before = self.count(PromiseState::Broken);
         let mut broken = None;
         for (place, flip) in flips.into_iter().enumerate() {
-            let first = *rig()[0].reference();
-            let eye_in_world = first.eye_in_world + Vec3::X * (0.9 * (place % 97) as f32 / 97.0);
             let view = AuditedView {
                 plan_epoch: self.plan().assignment.plan_epoch,
-                stream: 3,
-                camera: PinholeCamera { eye_in_world, ..first },
                 errors: ViewErrors { foreground_ratio: 0.5, flip, mean_square: flip * flip },
                 is_part: false,
             };
-            let report = AuditReport { views: vec![view], covered_views: 10, uncovered_views: 1, busy_s: 0.02 };
+            let report = AuditReport { views: vec![view], covered_views: 10, uncovered_views: 1 };
             self.tell(Event::Audited { workload_number: 1, node_name: "n0".to_owned(), report });
             broken = broken.or((self.count(PromiseState::Broken) > before).then_some(place + 1));
             self.wait(1);

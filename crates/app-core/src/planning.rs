@@ -6,7 +6,7 @@ use coordinator::plan_for_session;
 use coordinator::schedule::BudgetPlan;
 use depth_image::{Antialias, LightCacheQuality, PinholeCamera, ViewPlanes};
 use node::{DirectWork, Engine, Turn, ViewProbes, WorkClass};
-use planner::{Budget, Demand, Probed, Row, RowCosts};
+use planner::{Budget, Demand, Row};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 
@@ -108,15 +108,7 @@ pub fn measure(
         let request = plan.measurement(&probe).context("there is no such row")?;
         let budget = request.budget.clone().context("no measurement for a budget")?;
         match probes.probe(&request, &budget) {
-            Ok(measured) => {
-                let costs = RowCosts {
-                    sample_image_s: measured.costs.sample_image_s,
-                    load_set_s: measured.costs.load_set_s,
-                    view_s: measured.costs.reconstruct_view_s,
-                };
-                let probed = Probed { id: probe.id, views: measured.views, costs, busy_s: measured.busy_s };
-                plan.planner.answer(&probed)?;
-            }
+            Ok(measured) => plan.planner.answer(&measured.probed(probe.id))?,
             Err(status) => {
                 let is_truth = plan.planner.request().exact == Some(probe.row);
                 anyhow::ensure!(!is_truth, "views cannot be drawn directly: {}", status.message());

@@ -1,7 +1,7 @@
 //! Members: joining, measuring, being ready for plans, and reports on their own work and on each other.
 
 use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
-use planner::ViewErrors;
+use planner::{ProbeId, Probed, RowCosts, ViewErrors};
 use serde::{Deserialize, Serialize};
 
 use crate::audit::{AuditReport, check_view_errors};
@@ -132,6 +132,17 @@ pub struct Measured {
 }
 
 impl Measured {
+    /// The answer to a plan's measurement.
+    #[must_use]
+    pub fn probed(self, id: ProbeId) -> Probed {
+        let costs = RowCosts {
+            sample_image_s: self.costs.sample_image_s,
+            load_set_s: self.costs.load_set_s,
+            view_s: self.costs.reconstruct_view_s,
+        };
+        Probed { id, views: self.views, costs, busy_s: self.busy_s }
+    }
+
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {

@@ -84,9 +84,8 @@ impl WorkDone {
     }
 
     /// Adds an audited view. The first ones of a report count where there are too many.
-    pub fn audited(&self, workload_number: u64, view: AuditedView, seconds: f64) {
+    pub fn audited(&self, workload_number: u64, view: AuditedView) {
         let audit = &mut self.of(workload_number).audit;
-        audit.busy_s += seconds;
         if audit.views.len() < MAX_PROBE_VIEWS {
             audit.views.push(view);
         }

@@ -308,16 +308,9 @@ pub(super) fn work_report() -> WorkReport {
         dropped_views: 1,
         viewpoints: vec![camera()],
         audit: Some(AuditReport {
-            views: vec![AuditedView {
-                plan_epoch: 4,
-                stream: 9,
-                camera: camera(),
-                errors: probed_view(),
-                is_part: true,
-            }],
+            views: vec![AuditedView { plan_epoch: 4, errors: probed_view(), is_part: true }],
             covered_views: 40,
             uncovered_views: 2,
-            busy_s: 0.05,
         }),
     }
 }

@@ -2,6 +2,7 @@
 
 use app_core::planning::measure;
 use planner::{Budget, Demand, Row};
+use scene::procedural::parts::Rng;
 
 use super::table::{Stage, TableRow};
 
@@ -37,11 +38,11 @@ pub fn held_out(stage: &Stage, table: &[TableRow], seed: u64, count: u64) -> any
     let errors = table.iter().map(|row| row.error_ratio(&flip)).filter(|error| *error > 0.0);
     let (least, most) = errors.fold((1.0_f64, 0.0_f64), |(least, most), error| (least.min(error), most.max(error)));
     let mut plans = Vec::new();
+    let mut random = Rng::new(seed, 0);
     for number in 0..count {
-        let draw = unit(seed, number);
-        let level = (number as f64 + draw) / count as f64;
+        let level = (number as f64 + f64::from(random.unit())) / count as f64;
         let budget: Budget = format!("flip {:.4}", least * (most / least).powf(level)).parse()?;
-        let views_a_set = VIEWS_A_SET[(unit(seed ^ 1, number) * VIEWS_A_SET.len() as f64) as usize];
+        let views_a_set = VIEWS_A_SET[(random.unit() * VIEWS_A_SET.len() as f32) as usize];
         let demand = Demand { nodes: 1, cells: 1, views_a_set };
         let mut plan = stage.plan(budget, demand, 1 + seed.wrapping_add(number) % (1 << 32))?;
         measure(&mut plan, &stage.probers_of_its_own(), |_| ())?;
@@ -63,12 +64,4 @@ pub fn held_out(stage: &Stage, table: &[TableRow], seed: u64, count: u64) -> any
         });
     }
     Ok(plans)
-}
-
-/// A number from 0 to below 1 (SplitMix64).
-fn unit(seed: u64, place: u64) -> f64 {
-    let z = seed.wrapping_add(place.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }

@@ -139,12 +139,8 @@ impl Stage {
         let request = plan.measurement(&probe).context("there is no such row")?;
         let budget = request.budget.clone().context("no measurement for a budget")?;
         let measured = self.probers.probe(&request, &budget).map_err(|status| anyhow::anyhow!("{status}"))?;
-        let costs = RowCosts {
-            sample_image_s: measured.costs.sample_image_s,
-            load_set_s: measured.costs.load_set_s,
-            view_s: measured.costs.reconstruct_view_s,
-        };
-        Ok((measured.views, costs))
+        let probed = measured.probed(probe.id);
+        Ok((probed.views, probed.costs))
     }
 }
 

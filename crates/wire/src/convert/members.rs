@@ -38,9 +38,9 @@ messages! {
         views: view_count, dropped_views: dropped_view_count
     }, first |r| at_most(r.viewpoints.len(), MAX_VIEWPOINTS, "viewpoints"), then WorkReport::validate;
     AuditReport = AuditReport {
-        views, busy_s; covered_views: covered_view_count, uncovered_views: uncovered_view_count
+        views; covered_views: covered_view_count, uncovered_views: uncovered_view_count
     }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "audit.views");
-    AuditedView = AuditedView { plan_epoch, camera, errors, is_part; stream: stream_number };
+    AuditedView = AuditedView { plan_epoch, errors, is_part };
     ReportSamplerRequest = SamplerReport { plan_epoch, reason; compositor: compositor_name, sampler: sampler_name },
         then SamplerReport::validate;
     AchievedTime = AchievedTime { policy, busy_s };
