@@ -3,7 +3,7 @@
 //! 1. **Screening.** Rows are compared on common views by successive halving (Jamieson and Talwalkar 2016): on one view, the
 //!    better half on four, and half of these on eight. The first view is for one row of each method, and then for rows that promise more than
 //!    those that were measured, as far as their neighbours say.
-//! 2. **Test.** The best of many rows on few views looks better than it is. Up to three rows are therefore tested on parts of
+//! 2. **Test.** The best of many rows on few views looks better than it is. Up to four rows are therefore tested on parts of
 //!    fresh views, the safest first, and the first failure ends the test: whatever has passed holds together at 95 %
 //!    (fixed-sequence testing, Angelopoulos et al. 2021).
 
@@ -18,16 +18,17 @@ use crate::view_errors::ViewErrors;
 
 /// Common views of each comparison.
 const VIEWS: [usize; 3] = [1, 4, 8];
-/// Fresh views of a test.
-const FRESH_VIEWS: usize = 32;
+/// The most fresh views of a test.
+const MOST_FRESH_VIEWS: usize = 64;
 /// Rows that are left after screening.
 const FINALISTS: usize = 4;
 /// The most rows that are measured.
 const MOST_MEASURED: usize = 20;
-/// Of the rows with at most each of these shares of the budget's error the cheapest is tested.
-const TESTED_AT: [f64; 3] = [0.5, 0.75, 1.0];
+/// Of the rows with at most each of these shares of the budget's error the cheapest is tested, on this number of fresh views: an
+/// error near the budget needs a narrow bound. A test has the views of the one before, and more.
+const TESTS: [(f64, usize); 4] = [(0.5, 16), (0.75, 32), (0.9, MOST_FRESH_VIEWS), (1.0, MOST_FRESH_VIEWS)];
 /// A row is worth a test where it saves this share of the price of the one that was tested before.
-const WORTHWHILE: f64 = 0.02;
+const WORTHWHILE: f64 = 0.05;
 
 /// A measurement's plan, and its number within the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -139,10 +140,17 @@ enum Stage {
     },
     /// Rows from the safest to the cheapest, and the place of the one that is tested.
     Testing {
-        sequence: Vec<usize>,
+        sequence: Vec<Test>,
         place: usize,
     },
     Concluded(Outcome),
+}
+
+/// A row, and the number of fresh views that it is tested on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Test {
+    row: usize,
+    views: usize,
 }
 
 impl PlanRequest {
@@ -157,7 +165,7 @@ impl Probed {
     /// # Errors
     /// For a value that its field does not allow.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        within(self.views.len(), 1..=FRESH_VIEWS, "views", "from 1 to 32")?;
+        within(self.views.len(), 1..=MOST_FRESH_VIEWS, "views", "from 1 to 64")?;
         self.views.iter().try_for_each(ViewErrors::validate)?;
         within(self.busy_s, 0.0..=1e6, "busy_s", "from 0 to 10^6")?;
         self.costs.validate()
@@ -288,8 +296,8 @@ impl Planner {
                 Some((row, views[..alike].to_vec()))
             }
             Stage::Testing { sequence, place } => {
-                let row = *sequence.get(*place)?;
-                Some((row, (0..FRESH_VIEWS).map(|view| ProbeView::Fresh(view as u64)).collect()))
+                let Test { row, views } = *sequence.get(*place)?;
+                Some((row, (0..views).map(|view| ProbeView::Fresh(view as u64)).collect()))
             }
             Stage::Concluded(_) => None,
         }
@@ -370,18 +378,18 @@ impl Planner {
     }
 
     /// The rows to test, from the safest to the cheapest.
-    fn sequence(&self) -> Vec<usize> {
+    fn sequence(&self) -> Vec<Test> {
         let most_ratio = self.request.budget.most_ratio();
         let mut least_s = self.request.exact.map_or(f64::INFINITY, |exact| self.price_s(exact));
         let mut sequence = Vec::new();
-        for share in TESTED_AT {
+        for (share, views) in TESTS {
             let safe = (0..self.rows.len()).filter(|&row| {
                 self.is_measured(row) && !self.is_exact(row) && self.error_ratio(row) <= share * most_ratio
             });
             let cheapest = safe.min_by(|&a, &b| self.price_s(a).total_cmp(&self.price_s(b)));
             let cheapest = cheapest.filter(|&row| self.price_s(row) < least_s * (1.0 - WORTHWHILE));
             least_s = cheapest.map_or(least_s, |row| self.price_s(row));
-            sequence.extend(cheapest);
+            sequence.extend(cheapest.map(|row| Test { row, views }));
         }
         sequence
     }

@@ -20,8 +20,8 @@ const VIEWS_A_CALL: usize = 4;
 const MOST_TEXELS: usize = 16 << 20;
 /// The size in which shaders are built.
 const SMALL_PX: UVec2 = UVec2::new(32, 24);
-/// True views that are kept: all of two plans.
-const MOST_TRUTHS: usize = 64;
+/// True views that are kept: all of a plan.
+const MOST_TRUTHS: usize = 72;
 
 /// Measures ways to make views of one scene. Work is in `turn` among other work of the device, and the time for which it waits
 /// does not count.
