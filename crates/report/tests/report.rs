@@ -125,6 +125,19 @@ fn charts_are_xml_that_names_their_series_axes_and_limits() {
 }
 
 #[test]
+fn labels_do_not_cover_each_other_and_those_of_the_staircase_stay() {
+    let points = |y| ["a", "b", "c"].map(|name| Point::labelled(5.0, y, format!("{name} at {y}")));
+    let mut chart = XyChart::new("crowd", Axis::linear("x", ""), Axis::linear("y", ""))
+        .with(Series::points("crowd", points(1.0).into_iter().chain(points(9.0))))
+        .with(Series::points("front", [Point::labelled(5.0, 1.1, "on the front")]));
+    chart.staircase = vec![(5.0, 1.1).into()];
+    let svg = chart.to_svg().unwrap();
+    for (label, is_drawn) in [("on the front", true), ("a at 1", false), ("a at 9", true), ("b at 9", false)] {
+        assert_eq!(svg.contains(label), is_drawn, "{label}");
+    }
+}
+
+#[test]
 fn charts_without_points_are_drawn() {
     let empty = XyChart::new("empty", Axis::log("x", ""), Axis::linear("y", ""));
     let unplaceable = empty.clone().with(Series::line("zero", [(0.0, 1.0), (-1.0, f64::NAN), (f64::INFINITY, 2.0)]));

@@ -60,8 +60,6 @@ Exit status: 0 the budget is kept; 2 arguments or input that cannot be used; 3 n
 const SHARED: &str = "shared light";
 const IMAGES: &str = "samples alone";
 const DIRECT: &str = "direct drawing";
-/// Rows whose prices are closer to that of the choice, in powers of two, are not named.
-const LABELS_APART: f64 = 0.3;
 /// The time of a plan is compared with that of so many views.
 const COMPARED_VIEWS: f64 = 24.0;
 
@@ -120,6 +118,12 @@ struct Line {
     /// The error as a person reads it.
     error: String,
     is_chosen: bool,
+}
+
+impl Line {
+    fn point(&self) -> Point {
+        Point::labelled(self.price_ms, self.error_ratio, self.name.as_str())
+    }
 }
 
 /// All measured rows, the cheapest first.
@@ -181,20 +185,13 @@ fn chart(budget: Budget, lines: &[Line]) -> XyChart {
     };
     let cost = Axis::log("nodes' time for a view", "ms");
     let mut chart = XyChart::new(format!("Cost against error, {budget}"), cost, Axis::linear(error, ""));
-    let front = front(lines);
-    let chosen: Vec<&Line> = lines.iter().filter(|line| line.is_chosen).collect();
     for family in [SHARED, IMAGES, DIRECT] {
-        let points = lines.iter().filter(|line| line.family == family).map(|line| {
-            // Names would cover each other: those of the front are read, and of rows about as cheap as the choice its own.
-            let is_apart = chosen.iter().all(|chosen| (line.price_ms / chosen.price_ms).log2().abs() > LABELS_APART);
-            let is_named = front.iter().any(|other| std::ptr::eq(*other, line)) && (line.is_chosen || is_apart);
-            let name = if is_named { line.name.as_str() } else { "" };
-            Point::labelled(line.price_ms, line.error_ratio, name)
-        });
-        chart = chart.with(Series::points(family, points));
+        let own = lines.iter().filter(|line| line.family == family);
+        chart = chart.with(Series::points(family, own.map(Line::point)));
     }
-    chart = chart.with(Series::points("chosen", chosen.iter().map(|line| (line.price_ms, line.error_ratio))));
-    chart.staircase = front.iter().map(|line| (line.price_ms, line.error_ratio).into()).collect();
+    let chosen = lines.iter().filter(|line| line.is_chosen);
+    chart = chart.with(Series::points("chosen", chosen.map(Line::point)));
+    chart.staircase = front(lines).into_iter().map(Line::point).collect();
     chart.limits = vec![Limit { name: budget.to_string(), y: budget.most_ratio() }];
     chart
 }

@@ -19,7 +19,7 @@ pub struct Point {
     pub x: f64,
     /// The vertical coordinate.
     pub y: f64,
-    /// The label beside the point; may be empty.
+    /// The label beside the point; may be empty. It is not drawn over another.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub label: String,
 }

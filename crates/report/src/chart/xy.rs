@@ -156,19 +156,38 @@ impl XyChart {
     }
 
     /// Labels stand to the right of their points, or to the left near the right edge.
+    /// Labels of points on the staircase go before others, and those of later series, which lie on top, before those of earlier ones. A
+    /// label that would cover one before it is left out.
     fn draw_labels(&self, plot: &mut Plot, x: &Range<f64>) -> Result<(), String> {
-        let labelled = self.series.iter().flat_map(|series| &series.points).filter(|point| !point.label.is_empty());
-        let texts = labelled.filter_map(|point| {
-            let place = self.place(point)?;
+        let labelled =
+            self.series.iter().rev().flat_map(|series| &series.points).filter(|point| !point.label.is_empty());
+        let mut labelled: Vec<&Point> = labelled.collect();
+        labelled.sort_by_key(|point| !self.staircase.iter().any(|corner| corner.x == point.x && corner.y == point.y));
+        let mut drawn: Vec<(Range<i32>, i32)> = Vec::new();
+        let mut texts = Vec::new();
+        for point in labelled {
+            let Some(place) = self.place(point) else { continue };
+            let width_px = text_width_px(&point.label);
             let right_of_px = (x.end - place.0) / (x.end - x.start) * f64::from(WIDTH_PX - 100);
-            let fits = f64::from(text_width_px(&point.label) + 12) < right_of_px;
+            let fits = f64::from(width_px + 12) < right_of_px;
+            let (x_px, y_px) = plot.backend_coord(&place);
+            let first_px = if fits { x_px + 9 } else { x_px - 9 - width_px };
+            let columns_px = first_px..first_px + width_px;
+            let is_covered = drawn.iter().any(|(other, other_y_px)| {
+                let beside = columns_px.end <= other.start || other.end <= columns_px.start;
+                !beside && (y_px - other_y_px).abs() < TEXT_SIZE
+            });
+            if is_covered {
+                continue;
+            }
+            drawn.push((columns_px, y_px));
             let (offset, anchor) = if fits { (9, HPos::Left) } else { (-9, HPos::Right) };
-            Some(
+            texts.push(
                 EmptyElement::at(place)
                     + Text::new(point.label.clone(), (offset, -8), text_style(anchor, VPos::Center)),
-            )
-        });
-        plot.draw_series(texts.collect::<Vec<_>>()).map(drop).map_err(message)
+            );
+        }
+        plot.draw_series(texts).map(drop).map_err(message)
     }
 }
 
