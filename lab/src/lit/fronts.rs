@@ -1,7 +1,6 @@
 //! Fronts of cost against error under expensive light, part of `study fronts`.
 //!
-//! The rows are not those of the ladder: the planner does not choose among qualities of shared light, and direct drawing
-//! has an error here, the noise of its few rays.
+//! The rows are not those of budgets: sets are of more sizes, direct drawing has up to 64 rays, and its error is the noise of few.
 
 use std::path::Path;
 
